@@ -1,0 +1,74 @@
+//! One error enum for the whole library. A call that returns an error has changed nothing.
+
+/// What went wrong. The text names the value and the range that would have been accepted.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A handle is null, from another world, or its object was destroyed.
+    #[error("{noun}: {reason}")]
+    InvalidHandle {
+        /// Which noun the handle stands for: "body", "link", …
+        noun: &'static str,
+        /// Null, foreign or stale.
+        reason: &'static str,
+    },
+    /// A parameter is outside its range.
+    #[error("{what} is {value}; must be {range}")]
+    OutOfRange {
+        /// The parameter, as the descriptor spells it.
+        what: &'static str,
+        /// The value that was given.
+        value: String,
+        /// The values that are accepted.
+        range: &'static str,
+    },
+    /// The call makes no sense for this object, such as an impulse on a fixed link.
+    #[error("{0}")]
+    Unsupported(&'static str),
+    /// A limit of the library is reached, such as the number of live handles.
+    #[error("{0}")]
+    Capacity(&'static str),
+}
+
+/// Shorthand used throughout the library.
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// Builds [`Error::OutOfRange`].
+pub(crate) fn out_of_range(
+    what: &'static str,
+    value: impl std::fmt::Display,
+    range: &'static str,
+) -> Error {
+    Error::OutOfRange {
+        what,
+        value: value.to_string(),
+        range,
+    }
+}
+
+/// Accepts a finite number for which `ok` holds.
+pub(crate) fn require(
+    what: &'static str,
+    value: f64,
+    range: &'static str,
+    ok: impl Fn(f64) -> bool,
+) -> Result<()> {
+    if value.is_finite() && ok(value) {
+        Ok(())
+    } else {
+        Err(out_of_range(what, value, range))
+    }
+}
+
+/// Accepts a vector of finite numbers.
+pub(crate) fn require_finite(what: &'static str, v: &crate::math::Vec3) -> Result<()> {
+    if crate::math::is_finite(v) {
+        Ok(())
+    } else {
+        Err(out_of_range(
+            what,
+            format_args!("({}, {}, {})", v.x, v.y, v.z),
+            "finite",
+        ))
+    }
+}

@@ -1,0 +1,4 @@
+//! isocoat
+pub mod error;
+pub mod field;
+pub mod math;
