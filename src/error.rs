@@ -34,30 +34,13 @@ pub enum Error {
 pub type Result<T> = std::result::Result<T, Error>;
 
 /// Builds [`Error::OutOfRange`].
-pub(crate) fn out_of_range(
-    what: &'static str,
-    value: impl std::fmt::Display,
-    range: &'static str,
-) -> Error {
-    Error::OutOfRange {
-        what,
-        value: value.to_string(),
-        range,
-    }
+pub(crate) fn out_of_range(what: &'static str, value: impl std::fmt::Display, range: &'static str) -> Error {
+    Error::OutOfRange { what, value: value.to_string(), range }
 }
 
 /// Accepts a finite number for which `ok` holds.
-pub(crate) fn require(
-    what: &'static str,
-    value: f64,
-    range: &'static str,
-    ok: impl Fn(f64) -> bool,
-) -> Result<()> {
-    if value.is_finite() && ok(value) {
-        Ok(())
-    } else {
-        Err(out_of_range(what, value, range))
-    }
+pub(crate) fn require(what: &'static str, value: f64, range: &'static str, ok: impl Fn(f64) -> bool) -> Result<()> {
+    if value.is_finite() && ok(value) { Ok(()) } else { Err(out_of_range(what, value, range)) }
 }
 
 /// Accepts a vector of finite numbers.
@@ -65,10 +48,6 @@ pub(crate) fn require_finite(what: &'static str, v: &crate::math::Vec3) -> Resul
     if crate::math::is_finite(v) {
         Ok(())
     } else {
-        Err(out_of_range(
-            what,
-            format_args!("({}, {}, {})", v.x, v.y, v.z),
-            "finite",
-        ))
+        Err(out_of_range(what, format_args!("({}, {}, {})", v.x, v.y, v.z), "finite"))
     }
 }

@@ -23,20 +23,14 @@ pub struct Pose {
 
 impl Default for Pose {
     fn default() -> Self {
-        Self {
-            position: Vec3::zeros(),
-            rotation: Quat::identity(),
-        }
+        Self { position: Vec3::zeros(), rotation: Quat::identity() }
     }
 }
 
 impl Pose {
     /// A pose with the identity rotation.
     pub fn at(x: f64, y: f64, z: f64) -> Self {
-        Self {
-            position: Vec3::new(x, y, z),
-            ..Self::default()
-        }
+        Self { position: Vec3::new(x, y, z), ..Self::default() }
     }
 
     /// A point of the frame, in the world.
@@ -94,22 +88,14 @@ impl Wrench {
 pub fn rotation_from_vector(w: &Vec3) -> Quat {
     let angle = w.norm();
     // sin(x/2)/x, with its series where the quotient loses digits.
-    let s = if angle < 1e-4 {
-        0.5 - angle * angle / 48.0
-    } else {
-        libm::sin(0.5 * angle) / angle
-    };
+    let s = if angle < 1e-4 { 0.5 - angle * angle / 48.0 } else { libm::sin(0.5 * angle) / angle };
     let q = Quaternion::new(libm::cos(0.5 * angle), w.x * s, w.y * s, w.z * s);
     Quat::new_normalize(q)
 }
 
 /// The vector (axis times angle, angle in [0, π]) of a rotation: the inverse of [`rotation_from_vector`].
 pub fn rotation_to_vector(q: &Quat) -> Vec3 {
-    let (w, v) = if q.w < 0.0 {
-        (-q.w, -q.imag())
-    } else {
-        (q.w, q.imag())
-    };
+    let (w, v) = if q.w < 0.0 { (-q.w, -q.imag()) } else { (q.w, q.imag()) };
     let sine = v.norm();
     if sine < 1e-8 {
         return v * 2.0;
@@ -125,11 +111,7 @@ pub fn advance_rotation(q: &Quat, w: &Vec3, dt: f64) -> Quat {
 /// Two unit vectors that complete the unit vector `n` to a right-handed frame `(e1, e2, n)`; continuous in `n` away
 /// from the switch of its smallest component.
 pub fn tangents(n: &Vec3) -> (Vec3, Vec3) {
-    let seed = if n.x.abs() < 0.6 {
-        Vec3::x()
-    } else {
-        Vec3::y()
-    };
+    let seed = if n.x.abs() < 0.6 { Vec3::x() } else { Vec3::y() };
     let e1 = n.cross(&seed).normalize();
     (e1, n.cross(&e1))
 }

@@ -54,26 +54,13 @@ impl Profile {
         radius: f64,
         solid: bool,
     ) -> Result<Self> {
-        require("thickness", thickness, "> 0 and at most 1e9", |x| {
-            x > 0.0 && x <= 1e9
+        require("thickness", thickness, "> 0 and at most 1e9", |x| x > 0.0 && x <= 1e9)?;
+        let radius = if radius == 0.0 { 2.0 * thickness } else { radius };
+        require("radius", radius, "larger than thickness and at most 1e9 (or 0 for twice the thickness)", |x| {
+            x > thickness && x <= 1e9 && x - thickness > 1e-9 * x
         })?;
-        let radius = if radius == 0.0 {
-            2.0 * thickness
-        } else {
-            radius
-        };
-        require(
-            "radius",
-            radius,
-            "larger than thickness and at most 1e9 (or 0 for twice the thickness)",
-            |x| x > thickness && x <= 1e9 && x - thickness > 1e-9 * x,
-        )?;
         let width = radius - thickness;
-        let stiffness = if stiffness == 0.0 {
-            2.0 * isovalue / width
-        } else {
-            stiffness
-        };
+        let stiffness = if stiffness == 0.0 { 2.0 * isovalue / width } else { stiffness };
         // Beyond 3 c / (R - t) the cubic dips below zero before R: the field would not be monotone.
         require(
             "stiffness",
@@ -81,18 +68,9 @@ impl Profile {
             "> 0 and at most 3 isovalue / (radius - thickness) (or 0 for 2 isovalue / (radius - thickness))",
             |x| x > 0.0 && x * width <= 3.0 * isovalue * (1.0 + 1e-12),
         )?;
-        require("stiffening", stiffening, "from 0 to 1e6", |x| {
-            (0.0..=1e6).contains(&x)
-        })?;
+        require("stiffening", stiffening, "from 0 to 1e6", |x| (0.0..=1e6).contains(&x))?;
         let cap = if solid { 0.0 } else { CAP * thickness };
-        Ok(Self {
-            isovalue,
-            thickness,
-            stiffness,
-            stiffening,
-            radius,
-            cap,
-        })
+        Ok(Self { isovalue, thickness, stiffness, stiffening, radius, cap })
     }
 
     /// `F`, `F'` at distance `d` (negative inside a solid skeleton).
@@ -119,49 +97,25 @@ impl Profile {
         let (value, slope) = self.value_slope(d);
         if d > self.thickness {
             if d >= self.radius {
-                return Jet {
-                    value,
-                    slope,
-                    slope_over_distance: 0.0,
-                    curvature: 0.0,
-                };
+                return Jet { value, slope, slope_over_distance: 0.0, curvature: 0.0 };
             }
             let width = self.radius - self.thickness;
             let u = (self.radius - d) / width;
             let kw = self.stiffness * width;
             let (a, b) = (3.0 * self.isovalue - kw, kw - 2.0 * self.isovalue);
             let curvature = (2.0 * a + 6.0 * b * u) / (width * width);
-            return Jet {
-                value,
-                slope,
-                slope_over_distance: slope / d,
-                curvature,
-            };
+            return Jet { value, slope, slope_over_distance: slope / d, curvature };
         }
         let (capped, factor) = self.capped_distance(d);
         let x = self.thickness - capped;
-        let bend = if x < self.thickness {
-            (self.stiffening - 1.0) * self.stiffness / self.thickness
-        } else {
-            0.0
-        };
+        let bend = if x < self.thickness { (self.stiffening - 1.0) * self.stiffness / self.thickness } else { 0.0 };
         if self.is_capped(d) {
             let (_, inner_slope) = self.inner(x);
             let slope_over_distance = inner_slope / self.cap;
-            Jet {
-                value,
-                slope,
-                slope_over_distance,
-                curvature: bend * factor * factor + slope_over_distance,
-            }
+            Jet { value, slope, slope_over_distance, curvature: bend * factor * factor + slope_over_distance }
         } else {
             let slope_over_distance = if d > 0.0 { slope / d } else { 0.0 };
-            Jet {
-                value,
-                slope,
-                slope_over_distance,
-                curvature: bend,
-            }
+            Jet { value, slope, slope_over_distance, curvature: bend }
         }
     }
 
@@ -175,11 +129,8 @@ impl Profile {
     pub fn lipschitz(&self) -> f64 {
         let width = self.radius - self.thickness;
         let q = self.stiffness * width / self.isovalue;
-        let outer = if q >= 1.5 {
-            self.stiffness
-        } else {
-            (3.0 - q).powi(2) / (3.0 * (2.0 - q)) * self.isovalue / width
-        };
+        let outer =
+            if q >= 1.5 { self.stiffness } else { (3.0 - q).powi(2) / (3.0 * (2.0 - q)) * self.isovalue / width };
         outer.max(self.stiffness * self.stiffening.max(1.0))
     }
 
@@ -213,10 +164,7 @@ impl Profile {
             (self.isovalue + x * (k + 0.5 * bend * x), -(k + bend * x))
         } else {
             // Inside a solid core: on with the slope reached at its surface.
-            (
-                self.isovalue + t * (k + 0.5 * bend * t) + k * self.stiffening * (x - t),
-                -k * self.stiffening,
-            )
+            (self.isovalue + t * (k + 0.5 * bend * t) + k * self.stiffening * (x - t), -k * self.stiffening)
         }
     }
 
@@ -229,11 +177,7 @@ impl Profile {
     /// The distance with the cap's parabola near the skeleton, and its derivative.
     #[inline]
     fn capped_distance(&self, d: f64) -> (f64, f64) {
-        if self.is_capped(d) {
-            (0.5 * (d * d / self.cap + self.cap), d / self.cap)
-        } else {
-            (d, 1.0)
-        }
+        if self.is_capped(d) { (0.5 * (d * d / self.cap + self.cap), d / self.cap) } else { (d, 1.0) }
     }
 }
 
@@ -243,17 +187,11 @@ mod tests {
     use proptest::prelude::*;
 
     fn profiles() -> impl Strategy<Value = Profile> {
-        (
-            0.1..10.0f64,
-            0.01..5.0f64,
-            0.05..3.0f64,
-            0.0..20.0f64,
-            0.1..4.0f64,
-            any::<bool>(),
-        )
-            .prop_map(|(c, t, q, kappa, width, solid)| {
+        (0.1..10.0f64, 0.01..5.0f64, 0.05..3.0f64, 0.0..20.0f64, 0.1..4.0f64, any::<bool>()).prop_map(
+            |(c, t, q, kappa, width, solid)| {
                 Profile::new(c, t, q * c / (width * t), kappa, t * (1.0 + width), solid).unwrap()
-            })
+            },
+        )
     }
 
     proptest! {
@@ -299,13 +237,8 @@ mod tests {
 
     #[test]
     fn too_steep_a_profile_is_refused_with_value_and_range() {
-        let error = Profile::new(1.0, 0.1, 40.0, 1.0, 0.2, false)
-            .unwrap_err()
-            .to_string();
-        assert!(
-            error.contains("40") && error.contains("3 isovalue"),
-            "{error}"
-        );
+        let error = Profile::new(1.0, 0.1, 40.0, 1.0, 0.2, false).unwrap_err().to_string();
+        assert!(error.contains("40") && error.contains("3 isovalue"), "{error}");
         assert!(Profile::new(1.0, 0.3, 1.0, 1.0, 0.2, false).is_err());
         assert!(Profile::new(1.0, f64::NAN, 1.0, 1.0, 0.2, false).is_err());
     }

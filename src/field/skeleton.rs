@@ -63,26 +63,14 @@ fn segment_parameter(a: &Vec3, ab: &Vec3, p: &Vec3) -> f64 {
 #[inline]
 fn from_offset(offset: Vec3, feature: Feature) -> Closest {
     let distance = offset.norm();
-    let normal = if distance > 0.0 {
-        offset / distance
-    } else {
-        Vec3::zeros()
-    };
-    Closest {
-        distance,
-        normal,
-        feature,
-    }
+    let normal = if distance > 0.0 { offset / distance } else { Vec3::zeros() };
+    Closest { distance, normal, feature }
 }
 
 fn closest_on_segment(a: &Vec3, b: &Vec3, p: &Vec3) -> (Vec3, Feature) {
     let ab = b - a;
     let s = segment_parameter(a, &ab, p);
-    let feature = if s > 0.0 && s < 1.0 {
-        Feature::Edge(ab.normalize())
-    } else {
-        Feature::Vertex
-    };
+    let feature = if s > 0.0 && s < 1.0 { Feature::Edge(ab.normalize()) } else { Feature::Vertex };
     (a + ab * s, feature)
 }
 
@@ -114,10 +102,7 @@ fn closest_on_triangle(a: &Vec3, b: &Vec3, c: &Vec3, p: &Vec3) -> (Vec3, Feature
     let va = d3 * d6 - d5 * d4;
     if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
         let bc = c - b;
-        return (
-            b + bc * ((d4 - d3) / ((d4 - d3) + (d5 - d6))),
-            Feature::Edge(bc.normalize()),
-        );
+        return (b + bc * ((d4 - d3) / ((d4 - d3) + (d5 - d6))), Feature::Edge(bc.normalize()));
     }
     let scale = 1.0 / (va + vb + vc);
     (a + ab * (vb * scale) + ac * (vc * scale), Feature::Face)
@@ -125,21 +110,13 @@ fn closest_on_triangle(a: &Vec3, b: &Vec3, c: &Vec3, p: &Vec3) -> (Vec3, Feature
 
 fn closest_to_box(center: &Vec3, half: &Vec3, axes: &Mat3, p: &Vec3) -> Closest {
     let local = axes.tr_mul(&(p - center));
-    let excess = Vec3::new(
-        local.x.abs() - half.x,
-        local.y.abs() - half.y,
-        local.z.abs() - half.z,
-    );
+    let excess = Vec3::new(local.x.abs() - half.x, local.y.abs() - half.y, local.z.abs() - half.z);
     let sign = local.map(|x| if x < 0.0 { -1.0 } else { 1.0 });
     let outside = excess.map(|x| x.max(0.0));
     let count = excess.iter().filter(|x| **x > 0.0).count();
     if count == 0 {
         let axis = excess.imax();
-        return Closest {
-            distance: excess[axis],
-            normal: axes.column(axis) * sign[axis],
-            feature: Feature::Face,
-        };
+        return Closest { distance: excess[axis], normal: axes.column(axis) * sign[axis], feature: Feature::Face };
     }
     let distance = outside.norm();
     let normal = axes * (outside.component_mul(&sign) / distance);
@@ -148,22 +125,14 @@ fn closest_to_box(center: &Vec3, half: &Vec3, axes: &Mat3, p: &Vec3) -> Closest 
         2 => Feature::Edge(axes.column(excess.imin()).into_owned()),
         _ => Feature::Vertex,
     };
-    Closest {
-        distance,
-        normal,
-        feature,
-    }
+    Closest { distance, normal, feature }
 }
 
 impl Shape {
     /// A segment, or the point that a segment of no length is.
     pub fn segment(a: Vec3, b: Vec3) -> Self {
         let scale = a.norm().max(b.norm());
-        if (b - a).norm() <= 1e-12 * scale || a == b {
-            Shape::Point(a)
-        } else {
-            Shape::Segment(a, b)
-        }
+        if (b - a).norm() <= 1e-12 * scale || a == b { Shape::Point(a) } else { Shape::Segment(a, b) }
     }
 
     /// A triangle, or the segment or point that three collinear points span.
@@ -171,11 +140,7 @@ impl Shape {
         let edges = [(a, b), (b, c), (c, a)];
         let longest = edges
             .into_iter()
-            .max_by(|x, y| {
-                (x.1 - x.0)
-                    .norm_squared()
-                    .total_cmp(&(y.1 - y.0).norm_squared())
-            })
+            .max_by(|x, y| (x.1 - x.0).norm_squared().total_cmp(&(y.1 - y.0).norm_squared()))
             .unwrap_or((a, b));
         let length2 = (longest.1 - longest.0).norm_squared();
         if (b - a).cross(&(c - a)).norm() <= 1e-10 * length2 {
@@ -190,10 +155,7 @@ impl Shape {
         require_finite("plane normal", &normal)?;
         let length = normal.norm();
         crate::error::require("length of the plane normal", length, "> 0", |x| x > 1e-150)?;
-        Ok(Shape::Plane {
-            point,
-            normal: normal / length,
-        })
+        Ok(Shape::Plane { point, normal: normal / length })
     }
 
     /// True for shapes with a signed distance.
@@ -208,15 +170,10 @@ impl Shape {
             Shape::Point(a) => Shape::Point(at(a)),
             Shape::Segment(a, b) => Shape::Segment(at(a), at(b)),
             Shape::Triangle(a, b, c) => Shape::Triangle(at(a), at(b), at(c)),
-            Shape::Box { center, half, axes } => Shape::Box {
-                center: at(center),
-                half: *half,
-                axes: pose.rotation.to_rotation_matrix().matrix() * axes,
-            },
-            Shape::Plane { point, normal } => Shape::Plane {
-                point: at(point),
-                normal: pose.rotation * normal,
-            },
+            Shape::Box { center, half, axes } => {
+                Shape::Box { center: at(center), half: *half, axes: pose.rotation.to_rotation_matrix().matrix() * axes }
+            }
+            Shape::Plane { point, normal } => Shape::Plane { point: at(point), normal: pose.rotation * normal },
         }
     }
 
@@ -233,11 +190,9 @@ impl Shape {
                 from_offset(p - y, feature)
             }
             Shape::Box { center, half, axes } => closest_to_box(center, half, axes, p),
-            Shape::Plane { point, normal } => Closest {
-                distance: (p - point).dot(normal),
-                normal: *normal,
-                feature: Feature::Face,
-            },
+            Shape::Plane { point, normal } => {
+                Closest { distance: (p - point).dot(normal), normal: *normal, feature: Feature::Face }
+            }
         }
     }
 
@@ -314,14 +269,8 @@ pub fn closest_points(a: &Shape, b: &Shape) -> (Vec3, Vec3) {
 /// The middle of the part of a bounded shape that lies deepest against `normal`.
 fn deepest_point(shape: &Shape, normal: &Vec3) -> Vec3 {
     let average = |points: &[Vec3]| {
-        let lowest = points
-            .iter()
-            .map(|p| p.dot(normal))
-            .fold(f64::INFINITY, f64::min);
-        let highest = points
-            .iter()
-            .map(|p| p.dot(normal))
-            .fold(f64::NEG_INFINITY, f64::max);
+        let lowest = points.iter().map(|p| p.dot(normal)).fold(f64::INFINITY, f64::min);
+        let highest = points.iter().map(|p| p.dot(normal)).fold(f64::NEG_INFINITY, f64::max);
         // Corners within a thousandth of the height count as equally deep: a face at rest starts at its middle.
         let limit = lowest + 1e-3 * (highest - lowest) + 1e-12 * lowest.abs();
         let (mut sum, mut count) = (Vec3::zeros(), 0.0);
@@ -338,13 +287,7 @@ fn deepest_point(shape: &Shape, normal: &Vec3) -> Vec3 {
         Shape::Box { center, half, axes } => {
             let local = axes.tr_mul(normal);
             // Axes that lie in the plane do not choose a corner.
-            let corner = Vec3::from_fn(|i, _| {
-                if local[i].abs() < 1e-3 {
-                    0.0
-                } else {
-                    -local[i].signum() * half[i]
-                }
-            });
+            let corner = Vec3::from_fn(|i, _| if local[i].abs() < 1e-3 { 0.0 } else { -local[i].signum() * half[i] });
             center + axes * corner
         }
         Shape::Plane { point, .. } => *point,
@@ -386,11 +329,7 @@ impl Placed {
             Feature::Edge(t) => Mat3::identity() - nn - t * t.transpose(),
             Feature::Vertex => Mat3::identity() - nn,
         };
-        (
-            jet.value,
-            n * jet.slope,
-            nn * jet.curvature + across * jet.slope_over_distance,
-        )
+        (jet.value, n * jet.slope, nn * jet.curvature + across * jet.slope_over_distance)
     }
 }
 
@@ -407,17 +346,13 @@ mod tests {
         prop_oneof![
             vectors(1.0).prop_map(Shape::Point),
             (vectors(1.0), vectors(1.0)).prop_map(|(a, b)| Shape::segment(a, b)),
-            (vectors(1.0), vectors(1.0), vectors(1.0))
-                .prop_map(|(a, b, c)| Shape::triangle(a, b, c)),
+            (vectors(1.0), vectors(1.0), vectors(1.0)).prop_map(|(a, b, c)| Shape::triangle(a, b, c)),
             (vectors(1.0), vectors(1.0), vectors(2.0)).prop_map(|(center, h, r)| Shape::Box {
                 center,
                 half: h.map(|x| 0.1 + x.abs()),
-                axes: *crate::math::rotation_from_vector(&r)
-                    .to_rotation_matrix()
-                    .matrix(),
+                axes: *crate::math::rotation_from_vector(&r).to_rotation_matrix().matrix(),
             }),
-            (vectors(1.0), vectors(1.0))
-                .prop_filter_map("no normal", |(p, n)| Shape::plane(p, n).ok()),
+            (vectors(1.0), vectors(1.0)).prop_filter_map("no normal", |(p, n)| Shape::plane(p, n).ok()),
         ]
     }
 
