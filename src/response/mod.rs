@@ -1,0 +1,3 @@
+//! Response: how contact forces move links.
+
+pub mod mirror;

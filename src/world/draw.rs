@@ -1,0 +1,1 @@
+//! Debug drawing: lines and points that show skeletons, seeds and contacts.

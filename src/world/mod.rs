@@ -1,0 +1,459 @@
+//! The world: owns every body, link and skeleton; one [`World::step`] advances it.
+//!
+//! This file holds the nouns and their life; [`step`] is the pipeline, [`query`] what can be asked in between.
+
+pub mod arena;
+pub mod desc;
+pub mod draw;
+pub mod events;
+pub mod query;
+mod step;
+
+use std::sync::atomic::{AtomicU16, Ordering};
+
+use arena::{Arena, Noun};
+pub use desc::{
+    BodyDesc, BodyId, LinkDesc, LinkId, Response, Scheme, SkeletonDesc, SkeletonId, VelocityConvention, WorldDesc,
+};
+pub use events::{Contact, Counters, Event, EventKind, LogLevel};
+
+use crate::base::link::Kind;
+use crate::error::{Error, Result, require_finite};
+use crate::field::Profile;
+use crate::math::{Pose, Twist, Vec3, Wrench};
+use crate::response::mirror::Mirror;
+
+/// A body as the world keeps it.
+pub struct Body {
+    pub(crate) desc: BodyDesc,
+    pub(crate) links: Vec<u32>,
+    pub(crate) enabled: bool,
+    /// The units have been looked at since the last change (see [`step`]).
+    pub(crate) units_checked: bool,
+}
+
+/// A link as the world keeps it.
+pub struct Link {
+    pub(crate) desc: LinkDesc,
+    pub(crate) body: u32,
+    pub(crate) skeletons: Vec<u32>,
+    pub(crate) enabled: bool,
+    /// Forces of the host for the next step, about the centre of mass.
+    pub(crate) applied_force: Wrench,
+    /// Impulses of the host for the next step, about the centre of mass.
+    pub(crate) applied_impulse: Wrench,
+    /// Contact impulse over the last step, about the centre of mass.
+    pub(crate) contact_impulse: Wrench,
+    /// What the host is to apply to a host-driven link after the last step, about the centre of mass.
+    pub(crate) host_impulse: Wrench,
+    /// Length of the last step.
+    pub(crate) last_dt: f64,
+    pub(crate) mirror: Mirror,
+}
+
+/// A skeleton as the world keeps it.
+pub struct Skeleton {
+    pub(crate) desc: SkeletonDesc,
+    pub(crate) profile: Profile,
+    pub(crate) link: u32,
+    pub(crate) enabled: bool,
+}
+
+impl Noun for Body {
+    const NAME: &'static str = "body";
+}
+impl Noun for Link {
+    const NAME: &'static str = "link";
+}
+impl Noun for Skeleton {
+    const NAME: &'static str = "skeleton";
+}
+
+/// Position, orientation and velocity of a link.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LinkState {
+    /// The link's frame in the world.
+    pub pose: Pose,
+    /// Velocity of its centre of mass, and its angular velocity, in the world.
+    pub twist: Twist,
+}
+
+/// Receives the library's messages; the text is valid during the call.
+pub type Log = Box<dyn FnMut(LogLevel, &str) + Send>;
+/// Says whether two bodies may touch; called once a step for each pair whose bounds meet.
+pub type PairFilter = Box<dyn FnMut(BodyId, BodyId) -> bool + Send>;
+
+/// Everything; see the [module](self). Worlds are independent of each other.
+pub struct World {
+    desc: WorldDesc,
+    bodies: Arena<Body>,
+    links: Arena<Link>,
+    skeletons: Arena<Skeleton>,
+    log: Option<Log>,
+    pair_filter: Option<PairFilter>,
+    stepping: step::Stepping,
+}
+
+/// The tag that tells one world's handles from another's: the only process-wide state.
+static NEXT_WORLD: AtomicU16 = AtomicU16::new(1);
+
+fn next_world_tag() -> u16 {
+    loop {
+        let tag = NEXT_WORLD.fetch_add(1, Ordering::Relaxed);
+        if tag != 0 {
+            return tag;
+        }
+    }
+}
+
+/// Lives, descriptors.
+impl World {
+    /// Creates an empty world.
+    pub fn new(desc: WorldDesc) -> Result<Self> {
+        desc.validate()?;
+        let tag = next_world_tag();
+        Ok(Self {
+            desc,
+            bodies: Arena::new(tag),
+            links: Arena::new(tag),
+            skeletons: Arena::new(tag),
+            log: None,
+            pair_filter: None,
+            stepping: step::Stepping::default(),
+        })
+    }
+
+    /// The settings.
+    pub fn desc(&self) -> &WorldDesc {
+        &self.desc
+    }
+
+    /// Changes the settings, from the next step on.
+    pub fn set_desc(&mut self, desc: WorldDesc) -> Result<()> {
+        desc.validate()?;
+        self.desc = desc;
+        Ok(())
+    }
+
+    /// Sets who receives messages.
+    pub fn set_log(&mut self, log: Option<Log>) {
+        self.log = log;
+    }
+
+    /// Sets who decides about pairs, after categories and masks.
+    pub fn set_pair_filter(&mut self, filter: Option<PairFilter>) {
+        self.pair_filter = filter;
+    }
+
+    /// Creates a body without links.
+    pub fn create_body(&mut self, desc: BodyDesc) -> Result<BodyId> {
+        desc.validate()?;
+        self.bodies.insert(Body { desc, links: Vec::new(), enabled: true, units_checked: false })
+    }
+
+    /// Destroys a body with its links and skeletons.
+    pub fn destroy_body(&mut self, id: BodyId) -> Result<()> {
+        let body = self.bodies.remove(id)?;
+        for link in body.links {
+            self.drop_link(link as usize)?;
+        }
+        Ok(())
+    }
+
+    /// The descriptor of a body.
+    pub fn body_desc(&self, id: BodyId) -> Result<&BodyDesc> {
+        Ok(&self.bodies.get(id)?.desc)
+    }
+
+    /// Changes a body. A new isovalue must suit the profiles of all its skeletons.
+    pub fn set_body_desc(&mut self, id: BodyId, desc: BodyDesc) -> Result<()> {
+        desc.validate()?;
+        let body = self.bodies.get(id)?;
+        let skeletons = || body.links.iter().flat_map(|link| &self.links[*link as usize].skeletons);
+        if desc.isovalue != body.desc.isovalue {
+            for skeleton in skeletons() {
+                self.skeletons[*skeleton as usize].desc.profile(desc.isovalue)?;
+            }
+            for skeleton in skeletons().copied().collect::<Vec<_>>() {
+                let skeleton = &mut self.skeletons[skeleton as usize];
+                skeleton.profile = skeleton.desc.profile(desc.isovalue)?;
+            }
+        }
+        let body = self.bodies.get_mut(id)?;
+        body.desc = desc;
+        body.units_checked = false;
+        Ok(())
+    }
+
+    /// Takes a body out of the simulation, or puts it back.
+    pub fn set_body_enabled(&mut self, id: BodyId, enabled: bool) -> Result<()> {
+        self.bodies.get_mut(id)?.enabled = enabled;
+        Ok(())
+    }
+
+    /// Whether a body takes part.
+    pub fn body_is_enabled(&self, id: BodyId) -> Result<bool> {
+        Ok(self.bodies.get(id)?.enabled)
+    }
+
+    /// The links of a body, in the order of their creation.
+    pub fn body_links(&self, id: BodyId) -> Result<impl Iterator<Item = LinkId> + '_> {
+        Ok(self.bodies.get(id)?.links.iter().map(|index| self.links.id_of(*index as usize)))
+    }
+
+    /// Creates a link of a body.
+    pub fn create_link(&mut self, body: BodyId, mut desc: LinkDesc) -> Result<LinkId> {
+        desc.validate()?;
+        self.bodies.get(body)?;
+        desc.pose.rotation.renormalize();
+        let id = self.links.insert(Link {
+            desc,
+            body: body.raw.index,
+            skeletons: Vec::new(),
+            enabled: true,
+            applied_force: Wrench::default(),
+            applied_impulse: Wrench::default(),
+            contact_impulse: Wrench::default(),
+            host_impulse: Wrench::default(),
+            last_dt: 0.0,
+            mirror: Mirror::default(),
+        })?;
+        let body = self.bodies.get_mut(body)?;
+        body.links.push(id.raw.index);
+        body.units_checked = false;
+        Ok(id)
+    }
+
+    /// Destroys a link with its skeletons.
+    pub fn destroy_link(&mut self, id: LinkId) -> Result<()> {
+        let body = self.links.get(id)?.body as usize;
+        self.bodies[body].links.retain(|index| *index != id.raw.index);
+        self.drop_link(id.index())
+    }
+
+    fn drop_link(&mut self, index: usize) -> Result<()> {
+        let link = self.links.remove(self.links.id_of(index))?;
+        for skeleton in link.skeletons {
+            self.skeletons.remove(self.skeletons.id_of(skeleton as usize))?;
+        }
+        Ok(())
+    }
+
+    /// The descriptor of a link, with its present pose and twist.
+    pub fn link_desc(&self, id: LinkId) -> Result<&LinkDesc> {
+        Ok(&self.links.get(id)?.desc)
+    }
+
+    /// Changes a link, its pose and twist included.
+    pub fn set_link_desc(&mut self, id: LinkId, mut desc: LinkDesc) -> Result<()> {
+        desc.validate()?;
+        desc.pose.rotation.renormalize();
+        let link = self.links.get_mut(id)?;
+        if desc.kind != link.desc.kind {
+            link.mirror = Mirror::default();
+        }
+        link.desc = desc;
+        let body = link.body as usize;
+        self.bodies[body].units_checked = false;
+        Ok(())
+    }
+
+    /// Takes a link and its skeletons out of the simulation, or puts them back.
+    pub fn set_link_enabled(&mut self, id: LinkId, enabled: bool) -> Result<()> {
+        let link = self.links.get_mut(id)?;
+        link.enabled = enabled;
+        link.mirror = Mirror::default();
+        Ok(())
+    }
+
+    /// Whether a link takes part.
+    pub fn link_is_enabled(&self, id: LinkId) -> Result<bool> {
+        Ok(self.links.get(id)?.enabled)
+    }
+
+    /// The body of a link.
+    pub fn link_body(&self, id: LinkId) -> Result<BodyId> {
+        Ok(self.bodies.id_of(self.links.get(id)?.body as usize))
+    }
+
+    /// The skeletons of a link, in the order of their creation.
+    pub fn link_skeletons(&self, id: LinkId) -> Result<impl Iterator<Item = SkeletonId> + '_> {
+        Ok(self.links.get(id)?.skeletons.iter().map(|index| self.skeletons.id_of(*index as usize)))
+    }
+
+    /// Creates a skeleton of a link. A plane needs a link of kind fixed.
+    pub fn create_skeleton(&mut self, link: LinkId, desc: SkeletonDesc) -> Result<SkeletonId> {
+        let profile = self.check_skeleton(link, &desc)?;
+        let id = self.skeletons.insert(Skeleton { desc, profile, link: link.raw.index, enabled: true })?;
+        let link = self.links.get_mut(link)?;
+        link.skeletons.push(id.raw.index);
+        let body = link.body as usize;
+        self.bodies[body].units_checked = false;
+        Ok(id)
+    }
+
+    fn check_skeleton(&self, link: LinkId, desc: &SkeletonDesc) -> Result<Profile> {
+        let link = self.links.get(link)?;
+        let profile = desc.profile(self.bodies[link.body as usize].desc.isovalue)?;
+        if matches!(desc.shape, crate::field::Shape::Plane { .. }) && link.desc.kind != Kind::Fixed {
+            return Err(Error::Unsupported("a plane is for fixed links: it has no bounds to move"));
+        }
+        Ok(profile)
+    }
+
+    /// Destroys a skeleton.
+    pub fn destroy_skeleton(&mut self, id: SkeletonId) -> Result<()> {
+        let skeleton = self.skeletons.remove(id)?;
+        let link = &mut self.links[skeleton.link as usize];
+        link.skeletons.retain(|index| *index != id.raw.index);
+        let body = link.body as usize;
+        self.bodies[body].units_checked = false;
+        Ok(())
+    }
+
+    /// The descriptor of a skeleton.
+    pub fn skeleton_desc(&self, id: SkeletonId) -> Result<&SkeletonDesc> {
+        Ok(&self.skeletons.get(id)?.desc)
+    }
+
+    /// The field profile of a skeleton, with the stiffness and radius that stand for zeros in its descriptor.
+    pub fn skeleton_profile(&self, id: SkeletonId) -> Result<&Profile> {
+        Ok(&self.skeletons.get(id)?.profile)
+    }
+
+    /// Changes a skeleton.
+    pub fn set_skeleton_desc(&mut self, id: SkeletonId, desc: SkeletonDesc) -> Result<()> {
+        let link = self.links.id_of(self.skeletons.get(id)?.link as usize);
+        let profile = self.check_skeleton(link, &desc)?;
+        let skeleton = self.skeletons.get_mut(id)?;
+        (skeleton.desc, skeleton.profile) = (desc, profile);
+        let body = self.links.get(link)?.body as usize;
+        self.bodies[body].units_checked = false;
+        Ok(())
+    }
+
+    /// Takes a skeleton out of the simulation, or puts it back.
+    pub fn set_skeleton_enabled(&mut self, id: SkeletonId, enabled: bool) -> Result<()> {
+        self.skeletons.get_mut(id)?.enabled = enabled;
+        Ok(())
+    }
+
+    /// Whether a skeleton takes part.
+    pub fn skeleton_is_enabled(&self, id: SkeletonId) -> Result<bool> {
+        Ok(self.skeletons.get(id)?.enabled)
+    }
+
+    /// The link of a skeleton.
+    pub fn skeleton_link(&self, id: SkeletonId) -> Result<LinkId> {
+        Ok(self.links.id_of(self.skeletons.get(id)?.link as usize))
+    }
+}
+
+/// States and forces.
+impl World {
+    /// Pose and twist of a link.
+    pub fn link_state(&self, id: LinkId) -> Result<LinkState> {
+        let desc = &self.links.get(id)?.desc;
+        Ok(LinkState { pose: desc.pose, twist: desc.twist })
+    }
+
+    /// Sets pose and twist of a link: every tick for a host-driven one. What differs from what the last impulse
+    /// commanded counts as the host's own push; a jump of more than half the thinnest coat counts as a teleport.
+    pub fn set_link_state(&mut self, id: LinkId, state: &LinkState) -> Result<()> {
+        desc::validate_pose(&state.pose)?;
+        desc::validate_twist(&state.twist)?;
+        let link = self.links.get_mut(id)?;
+        link.desc.pose = state.pose;
+        link.desc.pose.rotation.renormalize();
+        link.desc.twist = state.twist;
+        Ok(())
+    }
+
+    /// Sets pose and twist of a link and forgets its contact history.
+    pub fn teleport_link(&mut self, id: LinkId, state: &LinkState) -> Result<()> {
+        self.set_link_state(id, state)?;
+        self.links.get_mut(id)?.mirror = Mirror::default();
+        Ok(())
+    }
+
+    /// Adds a force for the coming step, at a point of the world, or at the centre of mass.
+    pub fn apply_force(&mut self, id: LinkId, force: &Vec3, point: Option<&Vec3>) -> Result<()> {
+        let arm = self.check_push(id, "force", force, point)?;
+        self.links.get_mut(id)?.applied_force.add_force_at(force, &arm);
+        Ok(())
+    }
+
+    /// Adds a torque for the coming step.
+    pub fn apply_torque(&mut self, id: LinkId, torque: &Vec3) -> Result<()> {
+        self.check_push(id, "torque", torque, None)?;
+        self.links.get_mut(id)?.applied_force.torque += torque;
+        Ok(())
+    }
+
+    /// Adds an impulse at the start of the coming step, at a point of the world, or at the centre of mass.
+    pub fn apply_impulse(&mut self, id: LinkId, impulse: &Vec3, point: Option<&Vec3>) -> Result<()> {
+        let arm = self.check_push(id, "impulse", impulse, point)?;
+        self.links.get_mut(id)?.applied_impulse.add_force_at(impulse, &arm);
+        Ok(())
+    }
+
+    /// Adds an angular impulse at the start of the coming step.
+    pub fn apply_angular_impulse(&mut self, id: LinkId, impulse: &Vec3) -> Result<()> {
+        self.check_push(id, "angular impulse", impulse, None)?;
+        self.links.get_mut(id)?.applied_impulse.torque += impulse;
+        Ok(())
+    }
+
+    /// Checks a push and gives its lever arm from the centre of mass.
+    fn check_push(&self, id: LinkId, what: &'static str, push: &Vec3, point: Option<&Vec3>) -> Result<Vec3> {
+        require_finite(what, push)?;
+        let desc = &self.links.get(id)?.desc;
+        if !matches!(desc.kind, Kind::PointMass | Kind::Rigid) {
+            return Err(Error::Unsupported(
+                "forces and impulses go on links that the library integrates: the host pushes its own bodies itself",
+            ));
+        }
+        let Some(point) = point else { return Ok(Vec3::zeros()) };
+        require_finite("point", point)?;
+        Ok(point - desc.pose.transform_point(&desc.local_center))
+    }
+
+    /// Mean contact force and torque on a link over the last step, about its centre of mass.
+    pub fn link_wrench(&self, id: LinkId) -> Result<Wrench> {
+        let link = self.links.get(id)?;
+        let mut wrench = Wrench::default();
+        if link.last_dt > 0.0 {
+            wrench.add_scaled(&link.contact_impulse, 1.0 / link.last_dt);
+        }
+        Ok(wrench)
+    }
+
+    /// The impulse and angular impulse that the host is to apply at the centre of mass of a host-driven link before it
+    /// advances by the length of the last step.
+    pub fn link_impulse(&self, id: LinkId) -> Result<Wrench> {
+        Ok(self.links.get(id)?.host_impulse)
+    }
+}
+
+/// What the last step reported.
+impl World {
+    /// The contacts of the last step; of a sub-stepped one, as they were in its last sub-step.
+    pub fn contacts(&self) -> &[Contact] {
+        self.stepping.contacts()
+    }
+
+    /// What began, ended or overloaded in the last step.
+    pub fn events(&self) -> &[Event] {
+        self.stepping.events()
+    }
+
+    /// Figures of the last step.
+    pub fn counters(&self) -> Counters {
+        Counters {
+            bodies: self.bodies.len() as u32,
+            links: self.links.len() as u32,
+            skeletons: self.skeletons.len() as u32,
+            ..self.stepping.counters()
+        }
+    }
+}

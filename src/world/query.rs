@@ -1,0 +1,1 @@
+//! Questions between steps: fields, contacts of a pair, rays, overlaps, closest points, seeds.
