@@ -9,8 +9,11 @@
 //! - [`world`]: the nouns, the step, the queries.
 
 pub mod base;
+pub mod coat;
+pub mod contact;
 pub mod error;
 pub mod field;
+pub mod handle;
 pub mod math;
 pub mod response;
 pub mod world;

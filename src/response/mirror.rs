@@ -1,5 +1,131 @@
 //! The persistent mirror of a host-driven body.
+//!
+//! A host applies one impulse a tick, which cannot follow a stiff contact. So the library keeps a mirror of the body
+//! that goes through the contact in small steps, and returns the impulse that puts the host at the mirror's end
+//! position. The mirror's velocity is kept while the contact lasts and for one more tick, which hands both position and
+//! velocity over exactly (docs/model.md, "Mirror").
+//!
+//! The host stays in charge: whatever deviates from what the last impulse commanded is the host's own push and is
+//! added to the mirror; a jump is a teleport and makes it forget.
 
-/// State of a mirror between ticks.
+use nalgebra::Vector6;
+
+use super::VelocityConvention;
+use crate::base::{Inertia, Motion};
+use crate::math::{Mat3, Quat, Twist, Vec3, Wrench, rotate_tensor, rotation_to_vector};
+
+/// Turn of more than this between where a host body should be and where it is counts as a teleport \[rad\].
+const TELEPORT_ANGLE: f64 = 0.5;
+
+/// What is kept of a mirror between ticks.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Mirror {}
+pub struct Mirror {
+    active: bool,
+    /// Velocities at the end of the last tick.
+    twist: Twist,
+    /// Where the host should be now, and how fast, in its own convention.
+    expected_center: Vec3,
+    expected_rotation: Quat,
+    expected_twist: Twist,
+}
+
+/// What of the host matters to its mirror.
+#[derive(Clone, Copy, Debug)]
+pub struct Host {
+    /// Velocities as the host has them.
+    pub twist: Twist,
+    /// Which moment they belong to.
+    pub convention: VelocityConvention,
+    /// The host applies the gyroscopic torque itself.
+    pub gyroscopic: bool,
+    /// Jump that counts as a teleport \[m\].
+    pub teleport: f64,
+}
+
+impl Mirror {
+    /// Sets the velocities of a motion that stands where the host is.
+    pub fn enter(&mut self, host: &Host, motion: &mut Motion, dt: f64) {
+        let jumped = (motion.center - self.expected_center).norm() > host.teleport
+            || rotation_to_vector(&(motion.rotation * self.expected_rotation.inverse())).norm() > TELEPORT_ANGLE;
+        if self.active && jumped {
+            self.active = false;
+        }
+        motion.twist = if self.active {
+            Twist {
+                linear: self.twist.linear + (host.twist.linear - self.expected_twist.linear),
+                angular: self.twist.angular + (host.twist.angular - self.expected_twist.angular),
+            }
+        } else {
+            // A leapfrog host's velocities are half a tick old.
+            let age = match host.convention {
+                VelocityConvention::Leapfrog => 0.5 * dt,
+                VelocityConvention::Synchronous => 0.0,
+            };
+            Twist {
+                linear: host.twist.linear + motion.acceleration * age,
+                angular: host.twist.angular + motion.angular_acceleration * age,
+            }
+        };
+    }
+
+    /// Takes the motion at the end of the tick, which began at `center`, `rotation`, and gives the impulse for the
+    /// host. None is needed, and none given, without contact.
+    pub fn leave(&mut self, host: &Host, motion: &Motion, center: &Vec3, rotation: &Quat, dt: f64) -> Wrench {
+        if !motion.touched && !self.active {
+            return Wrench::default();
+        }
+        let mean = Twist {
+            linear: (motion.center - center) / dt,
+            angular: rotation_to_vector(&(motion.rotation * rotation.inverse())) / dt,
+        };
+        // What the host adds by itself before it moves, and what it then shows as its velocity.
+        let (before, after) = match host.convention {
+            VelocityConvention::Leapfrog => (dt, 0.0),
+            VelocityConvention::Synchronous => (0.5 * dt, 0.5 * dt),
+        };
+        let mut change = Twist {
+            linear: mean.linear - host.twist.linear - motion.acceleration * before,
+            angular: mean.angular - host.twist.angular - motion.angular_acceleration * before,
+        };
+        if host.gyroscopic
+            && let Inertia::Solid { local, inverse_local, .. } = &motion.inertia
+        {
+            change.angular -= gyroscopic_change(rotation, local, inverse_local, &host.twist.angular, dt);
+        }
+        *self = Mirror {
+            active: motion.touched,
+            twist: motion.twist,
+            expected_center: motion.center,
+            expected_rotation: motion.rotation,
+            expected_twist: Twist {
+                linear: mean.linear + motion.acceleration * after,
+                angular: mean.angular + motion.angular_acceleration * after,
+            },
+        };
+        impulse_for(&motion.inertia, rotation, &change)
+    }
+}
+
+/// Change of angular velocity by the gyroscopic torque over a tick, `-I⁻¹ (ω × I ω) dt`, at the start of the tick.
+fn gyroscopic_change(rotation: &Quat, local: &Mat3, inverse_local: &Mat3, angular: &Vec3, dt: f64) -> Vec3 {
+    let momentum = rotate_tensor(rotation, local) * angular;
+    rotate_tensor(rotation, inverse_local) * momentum.cross(angular) * dt
+}
+
+/// The impulse that changes the velocities of a body of this inertia at this rotation.
+fn impulse_for(inertia: &Inertia, rotation: &Quat, change: &Twist) -> Wrench {
+    match inertia {
+        Inertia::Immovable => Wrench::default(),
+        Inertia::Point { inverse_mass } => Wrench { force: change.linear / *inverse_mass, torque: Vec3::zeros() },
+        Inertia::Solid { inverse_mass, local, .. } => {
+            Wrench { force: change.linear / *inverse_mass, torque: rotate_tensor(rotation, local) * change.angular }
+        }
+        Inertia::Effective(matrix) => {
+            let (v, w) = (&change.linear, &change.angular);
+            let impulse = matrix
+                .cholesky()
+                .map_or_else(Vector6::zeros, |factor| factor.solve(&Vector6::new(v.x, v.y, v.z, w.x, w.y, w.z)));
+            Wrench { force: impulse.fixed_rows::<3>(0).into_owned(), torque: impulse.fixed_rows::<3>(3).into_owned() }
+        }
+    }
+}

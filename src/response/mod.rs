@@ -1,3 +1,28 @@
 //! Response: how contact forces move links.
 
+pub mod explicit;
 pub mod mirror;
+pub mod substep;
+pub mod substepped;
+
+/// How contact forces act on the links in time.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Response {
+    /// The library chooses; today always [`Response::Substepped`].
+    #[default]
+    Auto,
+    /// One force evaluation a step, at the pose of its beginning.
+    Explicit,
+    /// Many small steps inside each step; host-driven links through a persistent mirror.
+    Substepped,
+}
+
+/// In which moment of a tick a host's velocities live.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum VelocityConvention {
+    /// Semi-implicit Euler, as Bullet: `v += a dt`, then `x += v dt`. Velocities lag half a tick behind positions.
+    #[default]
+    Leapfrog,
+    /// Velocities belong to the same moment as the positions: `x += v dt + a dt²/2`, then `v += a dt`.
+    Synchronous,
+}

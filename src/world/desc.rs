@@ -2,44 +2,18 @@
 
 use super::{Body, Link, Skeleton};
 use crate::base::Kind;
+pub use crate::contact::Scheme;
 use crate::error::{Result, out_of_range, require, require_finite};
 use crate::field::{Profile, Shape};
 use crate::math::{Mat3, Pose, Quat, Twist, Vec3};
+pub use crate::response::{Response, VelocityConvention};
 
 /// Handle of a body.
-pub type BodyId = super::arena::Id<Body>;
+pub type BodyId = crate::handle::Id<Body>;
 /// Handle of a link.
-pub type LinkId = super::arena::Id<Link>;
+pub type LinkId = crate::handle::Id<Link>;
 /// Handle of a skeleton.
-pub type SkeletonId = super::arena::Id<Skeleton>;
-
-/// How contact forces act on the links in time.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Response {
-    /// The library chooses; today always [`Response::Substepped`].
-    #[default]
-    Auto,
-    /// One force evaluation a step, at the pose of its beginning.
-    Explicit,
-    /// Many small steps inside each step; host-driven links through a persistent mirror.
-    Substepped,
-}
-
-/// How the contact surface is integrated.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Scheme {
-    /// The cheapest that meets the tolerance.
-    #[default]
-    Auto,
-    /// Closed form; pairs without one take [`Scheme::Polar`].
-    ClosedForm,
-    /// Polar Gauss patch round the deepest point.
-    Polar,
-    /// Border-adaptive subdivision.
-    Adaptive,
-    /// Energy-consistent seeds, the papers' sampling.
-    Seeds,
-}
+pub type SkeletonId = crate::handle::Id<Skeleton>;
 
 /// Settings of a world.
 #[derive(Clone, Debug, PartialEq)]
@@ -142,16 +116,6 @@ impl BodyDesc {
             x == 0.0 || x >= self.friction.max(0.0) && x > 0.0
         })
     }
-}
-
-/// In which moment of a tick a host's velocities live.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum VelocityConvention {
-    /// Semi-implicit Euler, as Bullet: `v += a dt`, then `x += v dt`. Velocities lag half a tick behind positions.
-    #[default]
-    Leapfrog,
-    /// Velocities belong to the same moment as the positions: `x += v dt + a dt²/2`, then `v += a dt`.
-    Synchronous,
 }
 
 /// One moving frame of a body's base structure.

@@ -2,16 +2,18 @@
 //!
 //! This file holds the nouns and their life; [`step`] is the pipeline, [`query`] what can be asked in between.
 
-pub mod arena;
+pub use crate::handle as arena;
 pub mod desc;
 pub mod draw;
 pub mod events;
+mod gather;
 pub mod query;
 mod step;
+mod units;
 
 use std::sync::atomic::{AtomicU16, Ordering};
 
-use arena::{Arena, Noun};
+use crate::handle::{Arena, Noun};
 pub use desc::{
     BodyDesc, BodyId, LinkDesc, LinkId, Response, Scheme, SkeletonDesc, SkeletonId, VelocityConvention, WorldDesc,
 };
@@ -28,8 +30,8 @@ pub struct Body {
     pub(crate) desc: BodyDesc,
     pub(crate) links: Vec<u32>,
     pub(crate) enabled: bool,
-    /// The units have been looked at since the last change (see [`step`]).
-    pub(crate) units_checked: bool,
+    /// What has been said about its units since its last change.
+    pub(crate) units: units::Said,
 }
 
 /// A link as the world keeps it.
@@ -57,6 +59,10 @@ pub struct Skeleton {
     pub(crate) profile: Profile,
     pub(crate) link: u32,
     pub(crate) enabled: bool,
+    /// How far from it the body's surface may lie.
+    pub(crate) reach: f64,
+    /// Its rays, and the count they were made for; made at the first use.
+    pub(crate) rays: std::sync::OnceLock<(u32, std::sync::Arc<[crate::coat::seeds::Ray]>)>,
 }
 
 impl Noun for Body {
@@ -148,7 +154,7 @@ impl World {
     /// Creates a body without links.
     pub fn create_body(&mut self, desc: BodyDesc) -> Result<BodyId> {
         desc.validate()?;
-        self.bodies.insert(Body { desc, links: Vec::new(), enabled: true, units_checked: false })
+        self.bodies.insert(Body { desc, links: Vec::new(), enabled: true, units: units::Said::default() })
     }
 
     /// Destroys a body with its links and skeletons.
@@ -177,11 +183,12 @@ impl World {
             for skeleton in skeletons().copied().collect::<Vec<_>>() {
                 let skeleton = &mut self.skeletons[skeleton as usize];
                 skeleton.profile = skeleton.desc.profile(desc.isovalue)?;
+                skeleton.rays = Default::default();
             }
         }
         let body = self.bodies.get_mut(id)?;
         body.desc = desc;
-        body.units_checked = false;
+        self.refresh(id.index());
         Ok(())
     }
 
@@ -218,9 +225,8 @@ impl World {
             last_dt: 0.0,
             mirror: Mirror::default(),
         })?;
-        let body = self.bodies.get_mut(body)?;
-        body.links.push(id.raw.index);
-        body.units_checked = false;
+        self.bodies.get_mut(body)?.links.push(id.raw.index);
+        self.refresh(body.index());
         Ok(id)
     }
 
@@ -228,7 +234,9 @@ impl World {
     pub fn destroy_link(&mut self, id: LinkId) -> Result<()> {
         let body = self.links.get(id)?.body as usize;
         self.bodies[body].links.retain(|index| *index != id.raw.index);
-        self.drop_link(id.index())
+        self.drop_link(id.index())?;
+        self.refresh(body);
+        Ok(())
     }
 
     fn drop_link(&mut self, index: usize) -> Result<()> {
@@ -254,7 +262,7 @@ impl World {
         }
         link.desc = desc;
         let body = link.body as usize;
-        self.bodies[body].units_checked = false;
+        self.refresh(body);
         Ok(())
     }
 
@@ -263,6 +271,8 @@ impl World {
         let link = self.links.get_mut(id)?;
         link.enabled = enabled;
         link.mirror = Mirror::default();
+        let body = link.body as usize;
+        self.refresh(body);
         Ok(())
     }
 
@@ -281,14 +291,32 @@ impl World {
         Ok(self.links.get(id)?.skeletons.iter().map(|index| self.skeletons.id_of(*index as usize)))
     }
 
+    /// Brings what is derived from a body's parts up to date after a change of any of them.
+    fn refresh(&mut self, body: usize) {
+        self.bodies[body].units = units::Said::default();
+        let body = &self.bodies[body];
+        let skeletons: Vec<u32> = self.skeletons_of(body).map(|(_, index, _)| index).collect();
+        for index in &skeletons {
+            let skeleton = &mut self.skeletons[*index as usize];
+            skeleton.reach = crate::field::blend::reach(&skeleton.profile, skeletons.len());
+        }
+    }
+
     /// Creates a skeleton of a link. A plane needs a link of kind fixed.
     pub fn create_skeleton(&mut self, link: LinkId, desc: SkeletonDesc) -> Result<SkeletonId> {
         let profile = self.check_skeleton(link, &desc)?;
-        let id = self.skeletons.insert(Skeleton { desc, profile, link: link.raw.index, enabled: true })?;
+        let id = self.skeletons.insert(Skeleton {
+            desc,
+            profile,
+            link: link.raw.index,
+            enabled: true,
+            reach: profile.thickness,
+            rays: Default::default(),
+        })?;
         let link = self.links.get_mut(link)?;
         link.skeletons.push(id.raw.index);
         let body = link.body as usize;
-        self.bodies[body].units_checked = false;
+        self.refresh(body);
         Ok(id)
     }
 
@@ -307,7 +335,7 @@ impl World {
         let link = &mut self.links[skeleton.link as usize];
         link.skeletons.retain(|index| *index != id.raw.index);
         let body = link.body as usize;
-        self.bodies[body].units_checked = false;
+        self.refresh(body);
         Ok(())
     }
 
@@ -326,15 +354,18 @@ impl World {
         let link = self.links.id_of(self.skeletons.get(id)?.link as usize);
         let profile = self.check_skeleton(link, &desc)?;
         let skeleton = self.skeletons.get_mut(id)?;
-        (skeleton.desc, skeleton.profile) = (desc, profile);
+        (skeleton.desc, skeleton.profile, skeleton.rays) = (desc, profile, Default::default());
         let body = self.links.get(link)?.body as usize;
-        self.bodies[body].units_checked = false;
+        self.refresh(body);
         Ok(())
     }
 
     /// Takes a skeleton out of the simulation, or puts it back.
     pub fn set_skeleton_enabled(&mut self, id: SkeletonId, enabled: bool) -> Result<()> {
-        self.skeletons.get_mut(id)?.enabled = enabled;
+        let skeleton = self.skeletons.get_mut(id)?;
+        skeleton.enabled = enabled;
+        let link = skeleton.link as usize;
+        self.refresh(self.links[link].body as usize);
         Ok(())
     }
 

@@ -1,10 +1,36 @@
-//! The pipeline of one step.
+//! The pipeline of one step: hosts' poses in, candidate pairs, islands, response, impulses and events out.
 
-use super::{Contact, Counters, Event};
+use super::events::{Contact, Counters, Event, EventKind, LogLevel};
+use super::{BodyId, Link, World, units};
+use crate::base::{Kind, Motion};
+use crate::contact::broad_phase::{self, Bounds};
+use crate::contact::candidate::Candidate;
+use crate::contact::{pair::Side, surface};
+use crate::error::{Result, require};
+use crate::math::Wrench;
+use crate::response::mirror::Host;
+use crate::response::substep::{Island, Work};
+use crate::response::{Response, explicit, substepped};
 
 /// What the pipeline keeps between steps, and its buffers.
 #[derive(Default)]
 pub(crate) struct Stepping {
+    /// One a slot of a link.
+    motions: Vec<Motion>,
+    bounds: Vec<Bounds>,
+    bounds_of: Vec<usize>,
+    pairs: Vec<[u32; 2]>,
+    /// In the order of their bodies.
+    candidates: Vec<Candidate>,
+    /// Those of the last step, then their memory for reuse.
+    previous: Vec<Candidate>,
+    spare: Vec<Candidate>,
+    islands: Vec<Island>,
+    island_count: usize,
+    roots: Vec<u32>,
+    island_of: Vec<u32>,
+    rates: Vec<f64>,
+    work: Work,
     contacts: Vec<Contact>,
     events: Vec<Event>,
     counters: Counters,
@@ -24,9 +50,387 @@ impl Stepping {
     }
 }
 
-impl super::World {
-    /// Advances the world by `dt` seconds.
-    pub fn step(&mut self, dt: f64) -> crate::error::Result<()> {
-        crate::error::require("dt", dt, "> 0 and at most 10 s", |x| x > 0.0 && x <= 10.0)
+impl World {
+    /// Advances the world by `dt` seconds: links that the library moves are moved; for host-driven ones the impulses
+    /// are worked out that the host is to apply before it advances by the same `dt`.
+    pub fn step(&mut self, dt: f64) -> Result<()> {
+        require("dt", dt, "> 0 and at most 10 s", |x| x > 0.0 && x <= 10.0)?;
+        let mut state = std::mem::take(&mut self.stepping);
+        self.begin(&mut state, dt);
+        self.find_candidates(&mut state, dt);
+        self.check_units(&state, dt);
+        self.group(&mut state);
+        self.respond(&mut state, dt);
+        self.finish(&mut state, dt);
+        self.report(&mut state);
+        self.stepping = state;
+        Ok(())
+    }
+
+    /// Motions from the descriptors, host-driven ones through their mirrors; the host's pushes on our own.
+    fn begin(&mut self, state: &mut Stepping, dt: f64) {
+        state.motions.clear();
+        state.motions.resize(self.links.capacity(), Motion::default());
+        state.rates.resize(self.links.capacity(), 0.0);
+        for index in 0..self.links.capacity() {
+            if !self.links.is_live(index) {
+                continue;
+            }
+            let mut motion = self.motion_of(&self.links[index]);
+            let mirrored = self.is_mirrored(&self.links[index], &motion);
+            let teleport = if mirrored { 0.5 * self.thinnest(&self.links[index]) } else { 0.0 };
+            let link = &mut self.links[index];
+            if mirrored {
+                link.mirror.enter(&host(link, teleport), &mut motion, dt);
+            } else if motion.is_movable() && link.desc.kind != Kind::Host {
+                let pushed = motion.answer(&link.applied_impulse);
+                motion.twist.linear += pushed.linear;
+                motion.twist.angular += pushed.angular;
+                let pulled = motion.answer(&link.applied_force);
+                motion.acceleration += pulled.linear;
+                motion.angular_acceleration += pulled.angular;
+            }
+            (link.applied_force, link.applied_impulse) = (Wrench::default(), Wrench::default());
+            state.motions[index] = motion;
+        }
+    }
+
+    fn is_mirrored(&self, link: &Link, motion: &Motion) -> bool {
+        link.desc.kind == Kind::Host && motion.is_movable() && self.desc.response != Response::Explicit
+    }
+
+    /// Pairs of bodies whose bounds meet and that may touch.
+    fn find_candidates(&mut self, state: &mut Stepping, dt: f64) {
+        state.bounds.clear();
+        for index in self.bodies.indices() {
+            if self.bodies[index].enabled {
+                state.bounds.extend(self.bounds_of(index, &state.motions, dt));
+            }
+        }
+        broad_phase::pairs(&mut state.bounds, &mut state.pairs);
+        state.bounds_of.clear();
+        state.bounds_of.resize(self.bodies.capacity(), usize::MAX);
+        for (position, bounds) in state.bounds.iter().enumerate() {
+            state.bounds_of[bounds.body as usize] = position;
+        }
+        std::mem::swap(&mut state.candidates, &mut state.previous);
+        let mut old = 0;
+        let mut filter = self.pair_filter.take();
+        for pair in &state.pairs {
+            if !self.may_touch(pair, &state.motions, &mut filter) {
+                continue;
+            }
+            while old < state.previous.len() && state.previous[old].bodies < *pair {
+                old += 1;
+            }
+            let known = old < state.previous.len() && state.previous[old].bodies == *pair;
+            let mut candidate = if known {
+                std::mem::take(&mut state.previous[old])
+            } else {
+                let mut fresh = state.spare.pop().unwrap_or_default();
+                fresh.memory.forget();
+                fresh
+            };
+            candidate.bodies = *pair;
+            let bounds = pair.map(|body| &state.bounds[state.bounds_of[body as usize]]);
+            if self.fill(&mut candidate, &state.motions, bounds, self.desc.scheme) {
+                candidate.memory.touched = false;
+                state.candidates.push(candidate);
+            } else if known {
+                state.previous[old] = candidate;
+            } else {
+                state.spare.push(candidate);
+            }
+        }
+        self.pair_filter = filter;
+    }
+
+    fn may_touch(&self, pair: &[u32; 2], motions: &[Motion], filter: &mut Option<super::PairFilter>) -> bool {
+        let [a, b] = pair.map(|body| &self.bodies[body as usize]);
+        // A host-driven kinematic link may still have its wrench asked for: only bodies that are fixed all over are
+        // skipped.
+        let still = |body: &super::Body| {
+            body.links.iter().all(|link| {
+                self.links[*link as usize].desc.kind == Kind::Fixed && !motions[*link as usize].is_movable()
+            })
+        };
+        a.desc.mask & b.desc.category != 0
+            && b.desc.mask & a.desc.category != 0
+            && !(still(a) && still(b))
+            && filter.as_mut().is_none_or(|filter| {
+                let [a, b] = pair.map(|body| self.bodies.id_of(body as usize));
+                filter(a, b)
+            })
+    }
+
+    /// Says once a body when its units cannot work.
+    fn check_units(&mut self, state: &Stepping, dt: f64) {
+        let Some(mut log) = self.log.take() else { return };
+        for index in 0..self.bodies.capacity() {
+            if self.bodies.is_live(index) && self.bodies[index].enabled {
+                let warned = units::check(self, index, &state.motions, dt, &mut |text| log(LogLevel::Warning, text));
+                self.bodies[index].units = warned;
+            }
+        }
+        self.log = Some(log);
+    }
+
+    /// Islands: bodies that touch, directly or through others that can move.
+    fn group(&self, state: &mut Stepping) {
+        let bodies = self.bodies.capacity();
+        state.roots.clear();
+        state.roots.extend(0..bodies as u32);
+        fn find(roots: &mut [u32], mut body: u32) -> u32 {
+            while roots[body as usize] != body {
+                roots[body as usize] = roots[roots[body as usize] as usize];
+                body = roots[body as usize];
+            }
+            body
+        }
+        let movable =
+            |body: u32| self.bodies[body as usize].links.iter().any(|link| state.motions[*link as usize].is_movable());
+        for candidate in &state.candidates {
+            let [a, b] = candidate.bodies;
+            if movable(a) && movable(b) {
+                let (a, b) = (find(&mut state.roots, a), find(&mut state.roots, b));
+                state.roots[a.max(b) as usize] = a.min(b);
+            }
+        }
+        for island in &mut state.islands {
+            island.links.clear();
+            island.candidates.clear();
+        }
+        state.island_of.clear();
+        state.island_of.resize(bodies, u32::MAX);
+        let mut count = 0;
+        let mut island_for = |root: u32, islands: &mut Vec<Island>, island_of: &mut [u32]| {
+            if island_of[root as usize] == u32::MAX {
+                island_of[root as usize] = count as u32;
+                count += 1;
+                if islands.len() < count {
+                    islands.push(Island::default());
+                }
+            }
+            island_of[root as usize] as usize
+        };
+        for (index, candidate) in state.candidates.iter().enumerate() {
+            let [a, b] = candidate.bodies;
+            let root = find(&mut state.roots, if movable(a) { a } else { b });
+            let island = island_for(root, &mut state.islands, &mut state.island_of);
+            state.islands[island].candidates.push(index as u32);
+        }
+        for body in self.bodies.indices() {
+            if !self.bodies[body].enabled {
+                continue;
+            }
+            // A kinematic body touched only by others is drifted in each of their islands; see `respond`.
+            if movable(body as u32) {
+                let root = find(&mut state.roots, body as u32);
+                let island = island_for(root, &mut state.islands, &mut state.island_of);
+                state.islands[island].links.extend(&self.bodies[body].links);
+            }
+        }
+        state.island_count = count;
+        for island in &mut state.islands[..count] {
+            for index in &island.candidates {
+                for body in state.candidates[*index as usize].bodies {
+                    if !movable(body) {
+                        let moving = |link: &&u32| self.links[**link as usize].desc.kind == Kind::Host;
+                        for link in self.bodies[body as usize].links.iter().filter(moving) {
+                            if !island.links.contains(link) {
+                                island.links.push(*link);
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    fn respond(&mut self, state: &mut Stepping, dt: f64) {
+        let settings = surface::Settings { scheme: self.desc.scheme, tolerance: self.desc.force_tolerance };
+        let limits = substepped::Limits { phase: self.desc.substep_phase, most: self.desc.max_substeps };
+        state.work.evaluations = 0;
+        let mut most = 0;
+        let mut short = 0.0f64;
+        for island in &state.islands[..state.island_count] {
+            let (motions, candidates, work) = (&mut state.motions, &mut state.candidates, &mut state.work);
+            if self.desc.response == Response::Explicit {
+                explicit::step(motions, island, candidates, dt, &settings, work);
+                most = most.max(1);
+            } else {
+                let taken =
+                    substepped::step(motions, island, candidates, dt, &settings, &limits, &mut state.rates, work);
+                most = most.max(taken.substeps);
+                short = short.max(taken.wanted / f64::from(taken.substeps));
+            }
+            // Kinematic links start every island from the host's pose.
+            for link in &island.links {
+                let motion = &mut motions[*link as usize];
+                if !motion.is_movable() {
+                    let desc = &self.links[*link as usize].desc;
+                    motion.center = desc.pose.transform_point(&desc.local_center);
+                    motion.rotation = desc.pose.rotation;
+                }
+            }
+        }
+        if short > 1.0
+            && let Some(log) = &mut self.log
+        {
+            let text = format!(
+                "the stiffest contact asks for {:.0} sub-steps, max_substeps allows {}: raise it, or lower \
+                 stiffness_scale or dt",
+                short * f64::from(self.desc.max_substeps),
+                self.desc.max_substeps
+            );
+            log(LogLevel::Warning, &text);
+        }
+        state.counters = Counters {
+            pairs: state.candidates.len() as u32,
+            islands: state.island_count as u32,
+            substeps: most,
+            evaluations: state.work.evaluations,
+            ..Counters::default()
+        };
+    }
+
+    /// Writes back what moved, and what the host is to do.
+    fn finish(&mut self, state: &mut Stepping, dt: f64) {
+        for index in 0..self.links.capacity() {
+            if !self.links.is_live(index) {
+                continue;
+            }
+            let motion = &state.motions[index];
+            let mirrored = self.is_mirrored(&self.links[index], motion);
+            let teleport = if mirrored { 0.5 * self.thinnest(&self.links[index]) } else { 0.0 };
+            let link = &mut self.links[index];
+            link.contact_impulse = motion.contact_impulse;
+            link.last_dt = dt;
+            link.host_impulse = Wrench::default();
+            match link.desc.kind {
+                Kind::PointMass | Kind::Rigid => {
+                    link.desc.pose = motion.pose();
+                    link.desc.twist = motion.twist;
+                }
+                Kind::Host if mirrored => {
+                    let center = link.desc.pose.transform_point(&link.desc.local_center);
+                    let rotation = link.desc.pose.rotation;
+                    let host = host(link, teleport);
+                    link.host_impulse = link.mirror.leave(&host, motion, &center, &rotation, dt);
+                }
+                Kind::Host if motion.is_movable() => link.host_impulse = motion.contact_impulse,
+                Kind::Host | Kind::Fixed => {}
+            }
+        }
+    }
+
+    /// Contacts and events.
+    fn report(&mut self, state: &mut Stepping) {
+        state.contacts.clear();
+        state.events.clear();
+        // Pairs that are no longer candidates cannot touch.
+        for mut gone in state.previous.drain(..) {
+            if gone.memory.touching {
+                let bodies = gone.memory.ids.map(BodyId::from_raw);
+                state.events.push(Event { kind: EventKind::End, bodies });
+            }
+            gone.memory.forget();
+            // Those taken over into this step left an empty place behind.
+            if gone.pair.a.skeletons.capacity() > 0 {
+                state.spare.push(gone);
+            }
+        }
+        for candidate in &mut state.candidates {
+            let bodies = candidate.bodies.map(|body| self.bodies.id_of(body as usize));
+            let first = state.contacts.len();
+            self.contacts_of(candidate, &mut state.contacts);
+            let overloaded = !candidate.surface.overloads.is_empty();
+            let touching = state.contacts.len() > first || overloaded;
+            let memory = &mut candidate.memory;
+            memory.ids = bodies.map(|body| body.raw);
+            let mut say = |kind| state.events.push(Event { kind, bodies });
+            match (memory.touching, touching) {
+                (false, true) => say(EventKind::Begin),
+                (true, false) => say(EventKind::End),
+                // It came and went within the step.
+                (false, false) if memory.touched => {
+                    say(EventKind::Begin);
+                    say(EventKind::End);
+                }
+                _ => {}
+            }
+            if memory.overloaded && !memory.was_overloaded {
+                say(EventKind::Overload);
+            }
+            memory.touching = touching;
+            memory.was_overloaded = overloaded || memory.overloaded && touching;
+            memory.overloaded = false;
+        }
+        state.counters.patches = state.contacts.len() as u32;
+    }
+
+    /// The contacts of a candidate as they were last evaluated.
+    pub(super) fn contacts_of(&self, candidate: &Candidate, out: &mut Vec<Contact>) {
+        let pair = &candidate.pair;
+        for (patch, sums) in candidate.surface.patches.iter().zip(&candidate.loads) {
+            let size = sums.force.norm();
+            if size <= 0.0 {
+                continue;
+            }
+            let link = |side: &Side, index: usize| self.links.id_of(side.links[index] as usize);
+            let skeleton = |side: &Side, index: usize| self.skeletons.id_of(side.ids[index] as usize);
+            let [i, j] = patch.skeletons;
+            out.push(Contact {
+                bodies: candidate.bodies.map(|body| self.bodies.id_of(body as usize)),
+                links: [link(&pair.a, i), link(&pair.b, j)],
+                skeletons: [skeleton(&pair.a, i), skeleton(&pair.b, j)],
+                position: pair.origin + sums.center,
+                normal: sums.force / size,
+                force: sums.force,
+                torque: sums.torque,
+                area: sums.area,
+                peak_pressure: patch.peak_pressure,
+                stiffness: sums.stiffness,
+                error_estimate: patch.error_estimate,
+                evaluations: patch.evaluations,
+                scheme: patch.scheme,
+                overloaded: patch.overloaded,
+            });
+        }
+    }
+
+    /// The contacts of two bodies at their present poses, without stepping: the elastic forces alone.
+    pub fn collide(&self, a: BodyId, b: BodyId, scheme: super::Scheme, tolerance: f64) -> Result<Vec<Contact>> {
+        require("tolerance", tolerance, "from 1e-9 to 0.5", |x| (1e-9..=0.5).contains(&x))?;
+        self.bodies.get(a)?;
+        self.bodies.get(b)?;
+        if a == b {
+            return Err(crate::Error::Unsupported("a body does not collide with itself"));
+        }
+        let motions: Vec<Motion> = (0..self.links.capacity())
+            .map(|index| if self.links.is_live(index) { self.motion_of(&self.links[index]) } else { Motion::default() })
+            .collect();
+        let mut candidate = Candidate { bodies: [a.raw.index, b.raw.index], ..Candidate::default() };
+        let bounds = [a, b].map(|body| self.bounds_of(body.index(), &motions, 0.0));
+        let mut contacts = Vec::new();
+        let [Some(first), Some(second)] = &bounds else { return Ok(contacts) };
+        if self.fill(&mut candidate, &motions, [first, second], scheme) {
+            candidate.pair.place(&motions, candidate.lead);
+            let settings = surface::Settings { scheme, tolerance };
+            surface::integrate(&candidate.pair, &settings, &mut candidate.surface);
+            candidate.loads.extend(candidate.surface.sums());
+            self.contacts_of(&candidate, &mut contacts);
+        }
+        Ok(contacts)
+    }
+}
+
+/// What of a host-driven link matters to its mirror.
+fn host(link: &Link, teleport: f64) -> Host {
+    Host {
+        twist: link.desc.twist,
+        convention: link.desc.velocity_convention,
+        gyroscopic: link.desc.host_gyroscopic,
+        teleport,
     }
 }

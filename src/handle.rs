@@ -150,6 +150,11 @@ impl<T: Noun> Arena<T> {
         self.slots.iter().enumerate().filter(|(_, slot)| slot.value.is_some()).map(|(index, _)| index)
     }
 
+    /// Whether a slot holds an object.
+    pub fn is_live(&self, index: usize) -> bool {
+        self.slots.get(index).is_some_and(|slot| slot.value.is_some())
+    }
+
     /// Number of slots, live or not.
     pub fn capacity(&self) -> usize {
         self.slots.len()

@@ -1,0 +1,215 @@
+# isocoat: `make` builds, `make demo` shows, `make test` checks everything. `make help` lists the rest.
+# Needs GNU make, cargo and a C compiler; what else a target needs, `make deps` fetches.
+
+.DEFAULT_GOAL := build
+.DELETE_ON_ERROR:
+.SUFFIXES:
+MAKEFLAGS += --no-builtin-rules --no-print-directory
+
+CARGO      ?= cargo
+PKG_CONFIG ?= pkg-config
+ifeq ($(origin CC),default)
+CC := cc
+endif
+ifeq ($(origin CXX),default)
+CXX := c++
+endif
+
+PREFIX     ?= /usr/local
+LIBDIR     ?= lib
+INCLUDEDIR ?= include
+DESTDIR    ?=
+
+# The only place that says the version is Cargo.toml.
+VERSION := $(shell sed -n '/^\[package\]/,/^\[[^p]/s/^version *= *"\(.*\)"/\1/p' Cargo.toml)
+
+# What a static Rust library needs from a Linux system; tests/install compares it with what rustc says.
+STATIC_LIBS ?= -lgcc_s -lutil -lrt -lpthread -lm -ldl -lc
+
+TARGET    := $(abspath $(or $(CARGO_TARGET_DIR),target))
+WORK      := $(TARGET)/make
+STAGE     := $(WORK)/stage
+OUT       := out
+STATICLIB := $(TARGET)/release/libisocoat.a
+SHAREDLIB := $(TARGET)/release/libisocoat.$(if $(filter Darwin,$(shell uname -s)),dylib,so)
+HEADERS   := $(wildcard include/isocoat/*) $(wildcard bindings/*/*.hpp)
+
+WARNINGS     := -Wall -Wextra -Wpedantic -Wshadow -Werror
+C_FLAGS      := -std=c11 -O2 -g $(WARNINGS) -Wstrict-prototypes -Iinclude
+CXX_FLAGS    := -std=c++17 -O2 -g $(WARNINGS) -Iinclude -Ibindings/bullet
+ASAN_FLAGS   := -O1 -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=all
+BULLET_CFLAGS = $(shell $(PKG_CONFIG) --cflags $(1) | sed 's/-I/-isystem /g')
+BULLET_LIBS   = $(shell $(PKG_CONFIG) --libs $(1))
+
+# Programs are found, not listed: every file with a main.
+programs = $(if $(wildcard $(1)),$(shell grep -lE '^int main\>' $(wildcard $(1))))
+named    = $(foreach file,$(1),$(2)/$(basename $(notdir $(file)))$(3))
+
+C_TESTS      := $(call programs,tests/c/*.c)
+CPP_TESTS    := $(call programs,tests/cpp/*.cpp)
+C_EXAMPLES   := $(call programs,examples/c/*.c)
+CPP_EXAMPLES := $(call programs,examples/cpp/*.cpp)
+CMOCKA        = $(if $(shell grep -ls cmocka.h $(C_TESTS) /dev/null),$(shell $(PKG_CONFIG) --cflags --libs cmocka))
+
+# ---- build -----------------------------------------------------------------------------------------------------------
+
+.PHONY: build
+build: ## build the shared and the static library (release)
+	$(CARGO) build --release
+
+.PHONY: stage
+stage: build
+	@PREFIX='$(STAGE)' DESTDIR= LIBDIR=lib INCLUDEDIR=include $(INSTALL)
+
+# Cargo decides what is out of date; programs are linked again only when it made a new archive.
+$(STATICLIB): build
+	@:
+
+define compile_each # sources, folder, suffix, compiler line, libraries
+$(foreach file,$(1),$(eval $(call compile_one,$(file),$(call named,$(file),$(2),$(3)),$(4),$(5))))
+endef
+define compile_one
+$(2): $(1) $(HEADERS) $(STATICLIB) Makefile
+	@mkdir -p $$(@D)
+	$(3) $(1) -o $$@ $(STATICLIB) $(4) $(STATIC_LIBS)
+endef
+
+$(call compile_each,$(C_TESTS),$(WORK)/tests/c,,$$(CC) $$(C_FLAGS) $$(CFLAGS),$$(CMOCKA))
+$(call compile_each,$(C_TESTS),$(WORK)/tests/c,-asan,$$(CC) $$(C_FLAGS) $$(ASAN_FLAGS) $$(CFLAGS),$$(CMOCKA))
+$(call compile_each,$(CPP_TESTS),$(WORK)/tests/cpp,-float,$$(CXX) $$(CXX_FLAGS) $$(CXXFLAGS) $$(call BULLET_CFLAGS,bullet),$$(call BULLET_LIBS,bullet))
+$(call compile_each,$(CPP_TESTS),$(WORK)/tests/cpp,-double,$$(CXX) $$(CXX_FLAGS) $$(CXXFLAGS) $$(call BULLET_CFLAGS,bullet-float64),$$(call BULLET_LIBS,bullet-float64))
+$(call compile_each,$(C_EXAMPLES),$(WORK)/examples,,$$(CC) $$(C_FLAGS) $$(CFLAGS),)
+$(call compile_each,$(CPP_EXAMPLES),$(WORK)/examples,,$$(CXX) $$(CXX_FLAGS) $$(CXXFLAGS) $$(call BULLET_CFLAGS,bullet),$$(call BULLET_LIBS,bullet))
+
+C_TEST_BINS          := $(call named,$(C_TESTS),$(WORK)/tests/c)
+C_TEST_BINS_ASAN     := $(addsuffix -asan,$(C_TEST_BINS))
+BULLET_BINS          := $(call named,$(CPP_TESTS),$(WORK)/tests/cpp,-float) $(call named,$(CPP_TESTS),$(WORK)/tests/cpp,-double)
+EXAMPLE_BINS         := $(call named,$(C_EXAMPLES),$(WORK)/examples) $(call named,$(CPP_EXAMPLES),$(WORK)/examples)
+
+# ---- demo ------------------------------------------------------------------------------------------------------------
+
+.PHONY: demo
+demo: ## build, drop two balls from C and a pile with Bullet, plot height and force into out/
+	@tools/deps.sh demo
+	@$(MAKE) demo-c demo-bullet demo-plot
+
+.PHONY: demo-c demo-bullet demo-plot
+demo-c: $(WORK)/examples/two_balls
+	@printf '\n== Two balls, from C (examples/c/two_balls.c)\n'
+	@$<
+
+demo-bullet:
+	@printf '\n== A pile, with Bullet (examples/cpp/bullet_drop.cpp)\n'
+	@if command -v $(CXX) >/dev/null && $(PKG_CONFIG) --exists bullet 2>/dev/null; then \
+		$(MAKE) $(WORK)/examples/bullet_drop && $(WORK)/examples/bullet_drop; \
+	else \
+		echo 'Skipped: Bullet (libbullet-dev), a C++ compiler or pkg-config is missing, and could not be installed.'; \
+	fi
+
+demo-plot:
+	@printf '\n== The two balls again, from Rust, as a plot (examples/rust/two_balls_plot.rs)\n'
+	@mkdir -p $(OUT)
+	$(CARGO) run --release --quiet --example two_balls_plot -- $(OUT)/two_balls.svg
+
+# ---- test ------------------------------------------------------------------------------------------------------------
+
+# In this order; the first that fails stops the run. Each is also a target: `make test-valgrind`. What cargo runs comes
+# first, then what is linked to the libraries.
+STAGES := format clippy rust header doc plot build symbols c valgrind asan bullet examples install
+
+.PHONY: test check
+test: ## run every check, with a summary and times
+	@tools/deps.sh test
+	@LOGS='$(WORK)/logs' tools/stages.sh '$(MAKE)' $(STAGES)
+
+check: test ## what CI runs: the same as test
+
+.PHONY: $(STAGES:%=test-%)
+test-format:
+	$(CARGO) fmt --check
+
+test-clippy:
+	$(CARGO) clippy --release --all-targets -- -D warnings
+
+test-plot: demo-plot
+
+test-build: build
+
+test-rust:
+	$(CARGO) test --release
+
+# Private items too: who reads the sources follows the same links.
+test-doc:
+	RUSTDOCFLAGS='-D warnings -A rustdoc::private_intra_doc_links' $(CARGO) doc --release --no-deps --document-private-items
+
+# The checked-in header is what the sources say (regenerate with `make header`).
+test-header:
+	$(CARGO) test --release --test header
+
+.PHONY: header
+header: ## regenerate include/isocoat/isocoat.h from the sources
+	ISOCOAT_UPDATE_HEADER=1 $(CARGO) test --release --test header
+
+test-symbols: build
+	@tools/symbols.sh '$(SHAREDLIB)' '$(STATICLIB)' check
+
+.PHONY: symbols
+symbols: build ## accept today's exported functions as tests/abi/symbols.txt
+	@tools/symbols.sh '$(SHAREDLIB)' '$(STATICLIB)' update
+
+run_each = @test -n '$(strip $(1))' || { echo 'no program found for this stage'; exit 1; }; \
+	for program in $(1); do echo "-- $${program\#\#*/}"; $(2) $$program || { echo "$$program failed"; exit 1; }; done; \
+	echo '$(words $(1)) program(s) passed'
+
+test-c: $(C_TEST_BINS)
+	$(call run_each,$(C_TEST_BINS),)
+
+test-valgrind: $(C_TEST_BINS)
+	$(call run_each,$(C_TEST_BINS),valgrind --quiet --error-exitcode=99 --leak-check=full \
+		--errors-for-leak-kinds=definite$(comma)indirect$(comma)possible)
+
+# The C side is instrumented by the C compiler, and every allocation of the Rust side goes through the sanitizer's
+# malloc: overruns of host buffers, use after free at the boundary and leaks on either side are all seen.
+test-asan: $(C_TEST_BINS_ASAN)
+	$(call run_each,$(C_TEST_BINS_ASAN),env ASAN_OPTIONS=detect_leaks=1)
+
+test-bullet: $(BULLET_BINS)
+	$(call run_each,$(BULLET_BINS),)
+
+test-examples: $(EXAMPLE_BINS)
+	$(call run_each,$(EXAMPLE_BINS),)
+
+test-install: build
+	@CC='$(CC)' CXX='$(CXX)' PKG_CONFIG='$(PKG_CONFIG)' STATIC_LIBS='$(STATIC_LIBS)' VERSION='$(VERSION)' \
+		TARGET='$(TARGET)' WORK='$(WORK)/install-test' MAKE='$(MAKE)' tests/install/run.sh
+
+comma := ,
+
+.PHONY: bench
+bench: ## measure
+	$(CARGO) bench
+
+# ---- the rest --------------------------------------------------------------------------------------------------------
+
+INSTALL = VERSION='$(VERSION)' STATIC_LIBS='$(STATIC_LIBS)' STATICLIB='$(STATICLIB)' SHAREDLIB='$(SHAREDLIB)' \
+	packaging/install.sh
+
+.PHONY: install
+install: ## install libraries, headers, pkg-config and CMake files (PREFIX, DESTDIR, LIBDIR, INCLUDEDIR)
+	@# Takes what the last build left, so that `sudo make install` needs no cargo.
+	@test -f '$(STATICLIB)' && test -f '$(SHAREDLIB)' || $(MAKE) build
+	@PREFIX='$(PREFIX)' DESTDIR='$(DESTDIR)' LIBDIR='$(LIBDIR)' INCLUDEDIR='$(INCLUDEDIR)' $(INSTALL)
+
+.PHONY: deps
+deps: ## fetch what the tests need (Debian-like systems; elsewhere it says what is missing)
+	@tools/deps.sh test
+
+.PHONY: clean
+clean: ## remove what was built
+	$(CARGO) clean
+	rm -rf '$(WORK)' $(OUT)
+
+.PHONY: help
+help: ## this list
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(firstword $(MAKEFILE_LIST)) | \
+		while IFS='|' read -r name text; do printf '%-16s %s\n' "$$name" "$$text"; done

@@ -1,0 +1,288 @@
+//! Bodies: life, descriptors, links.
+
+use std::mem::offset_of;
+
+use libc::{c_void, size_t};
+
+use super::descriptor::{self, Descriptor, OutStruct};
+use super::guard::{free, isocoat_world, read, write};
+use super::handle::{isocoat_body, isocoat_link};
+use super::pointer::{List, Out};
+use super::status::{Checked, isocoat_status};
+use super::world::unknown;
+use crate::world::BodyDesc;
+
+/// What a body is made of: an ISOCOAT_BODY_ value.
+pub type isocoat_body_kind = u32;
+/// Its coat gives way under load.
+pub const ISOCOAT_BODY_DEFORMABLE: isocoat_body_kind = 0;
+/// Its coat keeps its shape; in a contact all the flesh that gives way is the other body's.
+pub const ISOCOAT_BODY_RIGID: isocoat_body_kind = 1;
+
+/// One object: what its coat is made of. Begin with isocoat_body_desc_default().
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub struct isocoat_body_desc {
+    /// Size of this struct in bytes, as the host knows it.
+    pub struct_size: u32,
+    /// What it is made of. Default ISOCOAT_BODY_DEFORMABLE.
+    pub kind: isocoat_body_kind,
+    /// Field value on the surface, > 1e-9 and at most 1e9. Default 1.
+    pub isovalue: f64,
+    /// Pressure a unit of field, in Pa, > 0 and at most 1e18. Default 1e5.
+    pub stiffness_scale: f64,
+    /// Coefficient of Coulomb friction, at least 0; a pair takes the geometric mean. Default 0.
+    pub friction: f64,
+    /// Coefficient of static friction: 0 (off), or at least friction; a pair takes the geometric mean. Default 0.
+    pub static_friction: f64,
+    /// Viscous friction, in sqrt(N s/m^3), at least 0; a pair takes the product. Default 0.
+    pub viscous_friction: f64,
+    /// Hunt-Crossley dissipation, in s/m, at least 0; a pair takes the mean weighted by the other's softness. Default 0.
+    pub dissipation: f64,
+    /// What this body is, as bits. Default 1.
+    pub category: u64,
+    /// Which categories it touches, as bits; two bodies touch when each one's mask has a bit of the other's category.
+    /// Default all.
+    pub mask: u64,
+    /// The host's own; given back, otherwise unused. Default NULL.
+    pub user_data: *mut c_void,
+}
+
+// SAFETY: `repr(C)`, the size first, numbers and a pointer that is never followed.
+unsafe impl Descriptor for isocoat_body_desc {
+    const NAME: &'static str = "isocoat_body_desc";
+    const FIRST_SIZE: usize = offset_of!(Self, user_data) + size_of::<*mut c_void>();
+
+    fn defaults() -> Self {
+        Self::from(&BodyDesc::default())
+    }
+}
+
+impl From<&BodyDesc> for isocoat_body_desc {
+    fn from(desc: &BodyDesc) -> Self {
+        Self {
+            struct_size: 0,
+            kind: if desc.rigid { ISOCOAT_BODY_RIGID } else { ISOCOAT_BODY_DEFORMABLE },
+            isovalue: desc.isovalue,
+            stiffness_scale: desc.stiffness_scale,
+            friction: desc.friction,
+            static_friction: desc.static_friction,
+            viscous_friction: desc.viscous_friction,
+            dissipation: desc.dissipation,
+            category: desc.category,
+            mask: desc.mask,
+            user_data: desc.user_data as *mut c_void,
+        }
+    }
+}
+
+impl isocoat_body_desc {
+    fn to_rust(self) -> Checked<BodyDesc> {
+        Ok(BodyDesc {
+            rigid: match self.kind {
+                ISOCOAT_BODY_DEFORMABLE => false,
+                ISOCOAT_BODY_RIGID => true,
+                other => return Err(unknown("kind", other, "ISOCOAT_BODY_", 1)),
+            },
+            isovalue: self.isovalue,
+            stiffness_scale: self.stiffness_scale,
+            friction: self.friction,
+            static_friction: self.static_friction,
+            viscous_friction: self.viscous_friction,
+            dissipation: self.dissipation,
+            category: self.category,
+            mask: self.mask,
+            user_data: self.user_data as usize,
+        })
+    }
+}
+
+/// Fills a descriptor with its defaults; isocoat_body_desc_default() calls it.
+///
+/// - desc: receives at most size bytes, its struct_size among them; not NULL.
+/// - size: sizeof(isocoat_body_desc) as the host was compiled.
+///
+/// Errors: INVALID_ARGUMENT. Threads: any.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn isocoat_body_desc_init(desc: *mut isocoat_body_desc, size: size_t) -> isocoat_status {
+    // SAFETY: the host gives `size` bytes.
+    free(|| unsafe { descriptor::init(desc, size, "desc") })
+}
+
+/// Creates a body without links.
+///
+/// - world: not NULL.
+/// - desc: what it is made of; not NULL.
+/// - body: receives the handle; not NULL.
+///
+/// Errors: INVALID_ARGUMENT, OUT_OF_RANGE, CAPACITY. Threads: changes the world.
+#[must_use]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn isocoat_body_create(
+    world: *mut isocoat_world,
+    desc: *const isocoat_body_desc,
+    body: *mut isocoat_body,
+) -> isocoat_status {
+    // SAFETY: the pointers are NULL or as their lines say.
+    unsafe {
+        write(world, |inner| {
+            let (desc, out) = (descriptor::read(desc, "desc")?, Out::new(body, "body")?);
+            out.put(inner.world.create_body(desc.to_rust()?)?.into());
+            Ok(())
+        })
+    }
+}
+
+/// Destroys a body with its links and skeletons.
+///
+/// - world: not NULL.
+/// - body: the body; its handle and those of its links and skeletons are stale afterwards.
+///
+/// Errors: INVALID_HANDLE. Threads: changes the world.
+#[must_use]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn isocoat_body_destroy(world: *mut isocoat_world, body: isocoat_body) -> isocoat_status {
+    // SAFETY: NULL or a live world.
+    unsafe { write(world, |inner| Ok(inner.world.destroy_body(body.into())?)) }
+}
+
+/// The descriptor of a body.
+///
+/// - world: not NULL.
+/// - body: the body.
+/// - desc: receives it; not NULL, with struct_size set.
+///
+/// Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
+#[must_use]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn isocoat_body_get_desc(
+    world: *const isocoat_world,
+    body: isocoat_body,
+    desc: *mut isocoat_body_desc,
+) -> isocoat_status {
+    // SAFETY: the pointers are NULL or as their lines say.
+    unsafe {
+        read(world, |inner| {
+            let out = OutStruct::new(desc, "desc")?;
+            out.put(&inner.world.body_desc(body.into())?.into());
+            Ok(())
+        })
+    }
+}
+
+/// Changes a body, from the next step on. A new isovalue must suit the profiles of all its skeletons.
+///
+/// - world: not NULL.
+/// - body: the body.
+/// - desc: the new descriptor, whole; not NULL.
+///
+/// Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE. Threads: changes the world.
+#[must_use]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn isocoat_body_set_desc(
+    world: *mut isocoat_world,
+    body: isocoat_body,
+    desc: *const isocoat_body_desc,
+) -> isocoat_status {
+    // SAFETY: the pointers are NULL or as their lines say.
+    unsafe {
+        write(world, |inner| {
+            let desc = descriptor::read(desc, "desc")?.to_rust()?;
+            Ok(inner.world.set_body_desc(body.into(), desc)?)
+        })
+    }
+}
+
+/// Takes a body out of the simulation, or puts it back. New bodies are enabled.
+///
+/// - world: not NULL.
+/// - body: the body.
+/// - enabled: whether it takes part.
+///
+/// Errors: INVALID_HANDLE. Threads: changes the world.
+#[must_use]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn isocoat_body_set_enabled(
+    world: *mut isocoat_world,
+    body: isocoat_body,
+    enabled: bool,
+) -> isocoat_status {
+    // SAFETY: NULL or a live world.
+    unsafe { write(world, |inner| Ok(inner.world.set_body_enabled(body.into(), enabled)?)) }
+}
+
+/// Whether a body takes part in the simulation.
+///
+/// - world: not NULL.
+/// - body: the body.
+/// - enabled: receives the answer; not NULL.
+///
+/// Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
+#[must_use]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn isocoat_body_is_enabled(
+    world: *const isocoat_world,
+    body: isocoat_body,
+    enabled: *mut bool,
+) -> isocoat_status {
+    // SAFETY: the pointers are NULL or as their lines say.
+    unsafe {
+        read(world, |inner| {
+            let out = Out::new(enabled, "enabled")?;
+            out.put(inner.world.body_is_enabled(body.into())?);
+            Ok(())
+        })
+    }
+}
+
+/// The host's own pointer of a body.
+///
+/// - world: not NULL.
+/// - body: the body.
+/// - user_data: receives the pointer; not NULL.
+///
+/// Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
+#[must_use]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn isocoat_body_get_user_data(
+    world: *const isocoat_world,
+    body: isocoat_body,
+    user_data: *mut *mut c_void,
+) -> isocoat_status {
+    // SAFETY: the pointers are NULL or as their lines say.
+    unsafe {
+        read(world, |inner| {
+            let out = Out::new(user_data, "user_data")?;
+            out.put(inner.world.body_desc(body.into())?.user_data as *mut c_void);
+            Ok(())
+        })
+    }
+}
+
+/// The links of a body, in the order of their creation.
+///
+/// - world: not NULL.
+/// - body: the body.
+/// - links: receives the handles; NULL with capacity 0 asks for the count only.
+/// - capacity: handles that links can hold.
+/// - count: receives the number of links, also when links is too small; not NULL.
+///
+/// Errors: INVALID_HANDLE, INVALID_ARGUMENT, BUFFER_TOO_SMALL. Threads: reads the world.
+#[must_use]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn isocoat_body_get_links(
+    world: *const isocoat_world,
+    body: isocoat_body,
+    links: *mut isocoat_link,
+    capacity: size_t,
+    count: *mut size_t,
+) -> isocoat_status {
+    // SAFETY: the pointers are NULL or as their lines say.
+    unsafe {
+        read(world, |inner| {
+            let out = List::new(links, capacity, "links", count)?;
+            let links = || inner.world.body_links(body.into());
+            out.put(links()?.count(), links()?.map(isocoat_link::from))
+        })
+    }
+}

@@ -1,0 +1,119 @@
+//! Structs that may grow: they begin with their size, so that older and newer hosts and libraries understand each
+//! other. Fields are only ever added at the end.
+
+use std::mem::MaybeUninit;
+use std::ptr;
+
+use super::status::{Checked, Refusal};
+
+/// The largest size taken for a struct: a larger one is a size that was never set.
+const LARGEST: usize = 1 << 16;
+
+/// A struct that begins with `struct_size`.
+///
+/// # Safety
+/// `repr(C)`, the first field is the `u32` size, and every bit pattern is a value.
+pub(super) unsafe trait Descriptor: Copy {
+    /// How C calls it.
+    const NAME: &'static str;
+    /// Size in the first release that had it: the end of the last field of that release.
+    const FIRST_SIZE: usize;
+    /// Every field at its default; `struct_size` does not matter.
+    fn defaults() -> Self;
+}
+
+fn check_size<T: Descriptor>(size: usize) -> Checked<()> {
+    if (T::FIRST_SIZE..=LARGEST).contains(&size) {
+        return Ok(());
+    }
+    Err(Refusal::argument(format!(
+        "struct_size of {name} is {size}; must be at least {first} and at most {LARGEST} (begin with {name}_default())",
+        name = T::NAME,
+        first = T::FIRST_SIZE,
+    )))
+}
+
+/// Reads the size of a struct of the host.
+///
+/// # Safety
+/// `pointer` is NULL or points to a struct that begins with its size.
+unsafe fn size_at<T: Descriptor>(pointer: *const T, name: &str) -> Checked<usize> {
+    // SAFETY: the size comes first.
+    let size = unsafe { super::pointer::read(pointer.cast::<u32>(), name) }? as usize;
+    check_size::<T>(size)?;
+    Ok(size)
+}
+
+/// Fills a struct with defaults: at most `size` bytes, and zeros beyond what this library knows.
+///
+/// # Safety
+/// `pointer` is NULL or `size` bytes can be written there.
+pub(super) unsafe fn init<T: Descriptor>(pointer: *mut T, size: usize, name: &str) -> Checked<()> {
+    if pointer.is_null() {
+        return Err(Refusal::argument(format!("{name} is NULL")));
+    }
+    check_size::<T>(size)?;
+    // SAFETY: as the caller promises.
+    unsafe { put(pointer, size, &T::defaults()) };
+    Ok(())
+}
+
+/// Reads a struct: the fields that the host has, the defaults for those it lacks.
+///
+/// # Safety
+/// `pointer` is NULL or points to a struct of the size that it says.
+pub(super) unsafe fn read<T: Descriptor>(pointer: *const T, name: &str) -> Checked<T> {
+    // SAFETY: the caller's promise.
+    let size = unsafe { size_at(pointer, name) }?;
+    for offset in size_of::<T>()..size {
+        // SAFETY: within the size that the struct says.
+        if unsafe { pointer.cast::<u8>().add(offset).read() } != 0 {
+            return Err(Refusal::argument(format!(
+                "byte {offset} of {} is not 0, but this library ({}) knows only the first {}: the host was compiled \
+                 with a newer header and sets a field that this library lacks",
+                T::NAME,
+                env!("CARGO_PKG_VERSION"),
+                size_of::<T>(),
+            )));
+        }
+    }
+    let mut value = MaybeUninit::new(T::defaults());
+    // SAFETY: both are at least that long; every bit pattern is a value, and padding stays padding.
+    Ok(unsafe {
+        ptr::copy_nonoverlapping(pointer.cast::<u8>(), value.as_mut_ptr().cast::<u8>(), size.min(size_of::<T>()));
+        value.assume_init()
+    })
+}
+
+/// Where a struct goes: its size is checked before the work.
+pub(super) struct OutStruct<T> {
+    pointer: *mut T,
+    size: usize,
+}
+
+impl<T: Descriptor> OutStruct<T> {
+    /// # Safety
+    /// `pointer` is NULL or points to a writable struct of the size that it says, until the call returns.
+    pub unsafe fn new(pointer: *mut T, name: &str) -> Checked<Self> {
+        // SAFETY: the caller's promise.
+        let size = unsafe { size_at(pointer.cast_const(), name) }?;
+        Ok(Self { pointer, size })
+    }
+
+    pub fn put(self, value: &T) {
+        // SAFETY: `size` bytes are writable, as promised to `new`.
+        unsafe { put(self.pointer, self.size, value) }
+    }
+}
+
+/// # Safety
+/// `size` bytes can be written at `pointer`, and at least the size field fits.
+unsafe fn put<T: Descriptor>(pointer: *mut T, size: usize, value: &T) {
+    let bytes = pointer.cast::<u8>();
+    // SAFETY: the two parts are within `size` and within `T`.
+    unsafe {
+        ptr::write_bytes(bytes, 0, size);
+        ptr::copy_nonoverlapping(ptr::from_ref(value).cast::<u8>(), bytes, size.min(size_of::<T>()));
+        pointer.cast::<u32>().write_unaligned(size as u32);
+    }
+}

@@ -1,0 +1,27 @@
+//! The C API: what `include/isocoat/isocoat.h` is generated from.
+//!
+//! Mechanism and nouns are apart. Mechanism: [`status`] (codes, messages), [`guard`] (panics, locks), [`pointer`] and
+//! [`descriptor`] (memory of the host), [`handle`], [`buffer`]. Nouns: [`world`], [`body`], [`link`], [`skeleton`], and
+//! what is done with them: [`motion`], [`bulk`], [`report`], [`query`], [`draw`].
+//!
+//! Nothing here computes: every function checks the host's pointers, translates, calls the public Rust API, and
+//! translates back. The comments are the manual that goes into the header.
+
+// The names and the promises are those of C. What a pointer must be stands in the line of its parameter.
+#![allow(non_camel_case_types, clippy::missing_safety_doc)]
+
+pub mod body;
+pub mod buffer;
+pub mod bulk;
+pub mod descriptor;
+pub mod guard;
+pub mod handle;
+pub mod link;
+pub mod math;
+pub mod motion;
+pub mod pointer;
+pub mod report;
+pub mod skeleton;
+pub mod status;
+pub mod version;
+pub mod world;

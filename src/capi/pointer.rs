@@ -1,0 +1,126 @@
+//! Memory of the host: NULL checks that name the parameter, and access that asks nothing of alignment.
+
+use super::status::{Checked, ISOCOAT_ERROR_BUFFER_TOO_SMALL, Refusal};
+use crate::math::Vec3;
+
+fn not_null<T>(pointer: *const T, name: &str) -> Checked<()> {
+    if pointer.is_null() { Err(Refusal::argument(format!("{name} is NULL"))) } else { Ok(()) }
+}
+
+/// Reads one value.
+///
+/// # Safety
+/// `pointer` is NULL or points to a `T` of the host, for which every bit pattern is a value.
+pub(super) unsafe fn read<T: Copy>(pointer: *const T, name: &str) -> Checked<T> {
+    not_null(pointer, name)?;
+    // SAFETY: not NULL, so readable.
+    Ok(unsafe { pointer.read_unaligned() })
+}
+
+/// Reads three doubles.
+///
+/// # Safety
+/// `pointer` is NULL or points to three doubles.
+pub(super) unsafe fn read_vector(pointer: *const f64, name: &str) -> Checked<Vec3> {
+    // SAFETY: the caller's promise.
+    Ok(Vec3::from(unsafe { read(pointer.cast::<[f64; 3]>(), name) }?))
+}
+
+/// Where one result goes; checked before the work, written after.
+pub(super) struct Out<T>(*mut T);
+
+impl<T> Out<T> {
+    /// # Safety
+    /// `pointer` is NULL or writable until the call returns.
+    pub unsafe fn new(pointer: *mut T, name: &str) -> Checked<Self> {
+        not_null(pointer, name)?;
+        Ok(Self(pointer))
+    }
+
+    pub fn put(self, value: T) {
+        // SAFETY: not NULL, so writable, as promised to `new`.
+        unsafe { self.0.write_unaligned(value) }
+    }
+}
+
+/// An array that the host gives.
+#[derive(Clone, Copy)]
+pub(super) struct Array<T> {
+    first: *const T,
+    pub count: usize,
+}
+
+impl<T: Copy> Array<T> {
+    /// # Safety
+    /// `first` is NULL, or `count` elements can be read from there until the call returns, and every bit pattern is a
+    /// value of `T`.
+    pub unsafe fn new(first: *const T, count: usize, name: &str) -> Checked<Self> {
+        if count > 0 {
+            not_null(first, name)?;
+        }
+        if count.checked_mul(size_of::<T>()).is_none_or(|bytes| bytes > isize::MAX as usize) {
+            return Err(Refusal::argument(format!("the count of {name} is {count}: no memory is that large")));
+        }
+        Ok(Self { first, count })
+    }
+
+    pub fn iter(self) -> impl Iterator<Item = T> {
+        // SAFETY: `index` is below the count that was promised to `new`.
+        (0..self.count).map(move |index| unsafe { self.first.add(index).read_unaligned() })
+    }
+}
+
+/// A buffer for a number of results that the host may ask for first.
+pub(super) struct List<T> {
+    first: *mut T,
+    capacity: usize,
+    count: Count,
+}
+
+impl<T> List<T> {
+    /// # Safety
+    /// `first` is NULL or `capacity` elements can be written there, `count` is NULL or writable, until the call returns.
+    pub unsafe fn new(first: *mut T, capacity: usize, name: &str, count: *mut usize) -> Checked<Self> {
+        if capacity > 0 {
+            not_null(first, name)?;
+        }
+        // SAFETY: the caller's promise.
+        let count = unsafe { Count::new(count) }?;
+        Ok(Self { first, capacity, count })
+    }
+
+    /// Writes the count, and the elements if they are wanted and fit.
+    pub fn put(self, needed: usize, elements: impl Iterator<Item = T>) -> Checked<()> {
+        self.count.put(needed, self.capacity, !self.first.is_null())?;
+        if !self.first.is_null() {
+            for (index, element) in elements.take(needed).enumerate() {
+                // SAFETY: `index < needed <= capacity`, as promised to `new`.
+                unsafe { self.first.add(index).write_unaligned(element) }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Where a count goes. It is written also when the buffers are too small, so that the host can make them larger.
+pub(super) struct Count(*mut usize);
+
+impl Count {
+    /// # Safety
+    /// `pointer` is NULL or writable until the call returns.
+    pub unsafe fn new(pointer: *mut usize) -> Checked<Self> {
+        not_null(pointer, "count")?;
+        Ok(Self(pointer))
+    }
+
+    /// Writes the count; refuses if the elements are wanted and do not fit.
+    pub fn put(self, needed: usize, capacity: usize, wanted: bool) -> Checked<()> {
+        // SAFETY: not NULL, so writable, as promised to `new`.
+        unsafe { self.0.write_unaligned(needed) };
+        if wanted && needed > capacity {
+            let message = format!("capacity is {capacity}; {needed} elements are to be written");
+            return Err(Refusal::new(ISOCOAT_ERROR_BUFFER_TOO_SMALL, message));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,259 @@
+//! What a step reports: contacts, events, counters.
+
+use std::mem::offset_of;
+
+use libc::size_t;
+
+use super::descriptor::{self, Descriptor, OutStruct};
+use super::guard::{free, isocoat_world, read};
+use super::handle::{isocoat_body, isocoat_link, isocoat_skeleton};
+use super::pointer::Out;
+use super::status::isocoat_status;
+use super::world::{isocoat_scheme, scheme_to_c};
+use crate::world::{Contact, Counters, Event, EventKind, World};
+
+/// One connected piece of contact surface between two coats.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct isocoat_contact {
+    /// The first body.
+    pub body_a: isocoat_body,
+    /// The second body.
+    pub body_b: isocoat_body,
+    /// The link of the first body whose field is the highest at the deepest point.
+    pub link_a: isocoat_link,
+    /// The same of the second.
+    pub link_b: isocoat_link,
+    /// The skeleton of the first body whose territory holds the deepest point.
+    pub skeleton_a: isocoat_skeleton,
+    /// The same of the second.
+    pub skeleton_b: isocoat_skeleton,
+    /// Centre of pressure, in m.
+    pub position: [f64; 3],
+    /// Mean normal, from a to b.
+    pub normal: [f64; 3],
+    /// Force on b, in N; a has the opposite.
+    pub force: [f64; 3],
+    /// Torque on b about position, in N m; a has the opposite.
+    pub torque: [f64; 3],
+    /// Area of the surface, in m^2.
+    pub area: f64,
+    /// Highest pressure, in Pa.
+    pub peak_pressure: f64,
+    /// Normal stiffness, in N/m: the integral of g_a g_b / (g_a + g_b) over the surface.
+    pub stiffness: f64,
+    /// Estimated relative error of the elastic force.
+    pub error_estimate: f64,
+    /// How often the two fields were evaluated.
+    pub evaluations: u32,
+    /// The scheme that integrated it.
+    pub scheme: isocoat_scheme,
+    /// 1 if the load is past the most that this contact can carry, else 0.
+    pub overloaded: u32,
+    /// 0.
+    pub reserved: u32,
+}
+
+impl From<&Contact> for isocoat_contact {
+    fn from(contact: &Contact) -> Self {
+        Self {
+            body_a: contact.bodies[0].into(),
+            body_b: contact.bodies[1].into(),
+            link_a: contact.links[0].into(),
+            link_b: contact.links[1].into(),
+            skeleton_a: contact.skeletons[0].into(),
+            skeleton_b: contact.skeletons[1].into(),
+            position: contact.position.into(),
+            normal: contact.normal.into(),
+            force: contact.force.into(),
+            torque: contact.torque.into(),
+            area: contact.area,
+            peak_pressure: contact.peak_pressure,
+            stiffness: contact.stiffness,
+            error_estimate: contact.error_estimate,
+            evaluations: contact.evaluations,
+            scheme: scheme_to_c(contact.scheme),
+            overloaded: contact.overloaded.into(),
+            reserved: 0,
+        }
+    }
+}
+
+/// What happened to a pair of bodies: an ISOCOAT_EVENT_ value. More may come.
+pub type isocoat_event_kind = u32;
+/// The coats began to touch.
+pub const ISOCOAT_EVENT_BEGIN: isocoat_event_kind = 0;
+/// The coats stopped touching.
+pub const ISOCOAT_EVENT_END: isocoat_event_kind = 1;
+/// The contact went past the most it can carry.
+pub const ISOCOAT_EVENT_OVERLOAD: isocoat_event_kind = 2;
+
+/// A change between two bodies in the last step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(C)]
+pub struct isocoat_event {
+    /// What happened.
+    pub kind: isocoat_event_kind,
+    /// 0.
+    pub reserved: u32,
+    /// The first body; it may have been destroyed since.
+    pub body_a: isocoat_body,
+    /// The second body; it may have been destroyed since.
+    pub body_b: isocoat_body,
+}
+
+impl From<&Event> for isocoat_event {
+    fn from(event: &Event) -> Self {
+        Self {
+            kind: match event.kind {
+                EventKind::Begin => ISOCOAT_EVENT_BEGIN,
+                EventKind::End => ISOCOAT_EVENT_END,
+                EventKind::Overload => ISOCOAT_EVENT_OVERLOAD,
+            },
+            reserved: 0,
+            body_a: event.bodies[0].into(),
+            body_b: event.bodies[1].into(),
+        }
+    }
+}
+
+/// What the views of a world point to; refreshed by a step, in memory that is kept.
+#[derive(Default)]
+pub(super) struct Views {
+    contacts: Vec<isocoat_contact>,
+    events: Vec<isocoat_event>,
+}
+
+impl Views {
+    pub fn refresh(&mut self, world: &World) {
+        self.contacts.clear();
+        self.contacts.extend(world.contacts().iter().map(isocoat_contact::from));
+        self.events.clear();
+        self.events.extend(world.events().iter().map(isocoat_event::from));
+    }
+}
+
+/// Figures of the last step. Begin with isocoat_counters_default().
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub struct isocoat_counters {
+    /// Size of this struct in bytes, as the host knows it.
+    pub struct_size: u32,
+    /// Live bodies.
+    pub bodies: u32,
+    /// Live links.
+    pub links: u32,
+    /// Live skeletons.
+    pub skeletons: u32,
+    /// Pairs of bodies whose bounds met.
+    pub pairs: u32,
+    /// Groups of bodies that were stepped together.
+    pub islands: u32,
+    /// Sub-steps of the group that took the most.
+    pub substeps: u32,
+    /// Pieces of contact surface at the end of the step.
+    pub patches: u32,
+    /// Evaluations of a pair of fields.
+    pub evaluations: u64,
+}
+
+// SAFETY: `repr(C)`, the size first, integers only.
+unsafe impl Descriptor for isocoat_counters {
+    const NAME: &'static str = "isocoat_counters";
+    const FIRST_SIZE: usize = offset_of!(Self, evaluations) + size_of::<u64>();
+
+    fn defaults() -> Self {
+        Self::from(Counters::default())
+    }
+}
+
+impl From<Counters> for isocoat_counters {
+    fn from(counters: Counters) -> Self {
+        let Counters { bodies, links, skeletons, pairs, islands, substeps, patches, evaluations } = counters;
+        Self { struct_size: 0, bodies, links, skeletons, pairs, islands, substeps, patches, evaluations }
+    }
+}
+
+/// Fills counters with zeros and their size; isocoat_counters_default() calls it.
+///
+/// - counters: receives at most size bytes, its struct_size among them; not NULL.
+/// - size: sizeof(isocoat_counters) as the host was compiled.
+///
+/// Errors: INVALID_ARGUMENT. Threads: any.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn isocoat_counters_init(counters: *mut isocoat_counters, size: size_t) -> isocoat_status {
+    // SAFETY: the host gives `size` bytes.
+    free(|| unsafe { descriptor::init(counters, size, "counters") })
+}
+
+/// The contacts of the last step; of a sub-stepped one, as they were in its last sub-step.
+///
+/// - world: not NULL.
+/// - contacts: receives a pointer to them (not to be freed); not NULL.
+/// - count: receives their number; not NULL.
+///
+/// Errors: INVALID_ARGUMENT. Threads: reads the world. Lifetime: until the next step or destroy of the world.
+#[must_use]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn isocoat_world_get_contacts(
+    world: *const isocoat_world,
+    contacts: *mut *const isocoat_contact,
+    count: *mut size_t,
+) -> isocoat_status {
+    // SAFETY: the pointers are NULL or as their lines say.
+    unsafe {
+        read(world, |inner| {
+            let (first, length) = (Out::new(contacts, "contacts")?, Out::new(count, "count")?);
+            first.put(inner.views.contacts.as_ptr());
+            length.put(inner.views.contacts.len());
+            Ok(())
+        })
+    }
+}
+
+/// What began, ended or was overloaded in the last step.
+///
+/// - world: not NULL.
+/// - events: receives a pointer to them (not to be freed); not NULL.
+/// - count: receives their number; not NULL.
+///
+/// Errors: INVALID_ARGUMENT. Threads: reads the world. Lifetime: until the next step or destroy of the world.
+#[must_use]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn isocoat_world_get_events(
+    world: *const isocoat_world,
+    events: *mut *const isocoat_event,
+    count: *mut size_t,
+) -> isocoat_status {
+    // SAFETY: the pointers are NULL or as their lines say.
+    unsafe {
+        read(world, |inner| {
+            let (first, length) = (Out::new(events, "events")?, Out::new(count, "count")?);
+            first.put(inner.views.events.as_ptr());
+            length.put(inner.views.events.len());
+            Ok(())
+        })
+    }
+}
+
+/// Figures of the last step, and how many objects live now.
+///
+/// - world: not NULL.
+/// - counters: receives them; not NULL, with struct_size set.
+///
+/// Errors: INVALID_ARGUMENT. Threads: reads the world.
+#[must_use]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn isocoat_world_get_counters(
+    world: *const isocoat_world,
+    counters: *mut isocoat_counters,
+) -> isocoat_status {
+    // SAFETY: the pointers are NULL or as their lines say.
+    unsafe {
+        read(world, |inner| {
+            let out = OutStruct::new(counters, "counters")?;
+            out.put(&inner.world.counters().into());
+            Ok(())
+        })
+    }
+}

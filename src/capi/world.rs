@@ -1,0 +1,349 @@
+//! Worlds: life, settings, step, callbacks.
+
+use std::mem::offset_of;
+
+use libc::{c_char, c_void, size_t};
+
+use super::descriptor::{self, Descriptor, OutStruct};
+use super::guard::{self, free, isocoat_world, outside, read, write};
+use super::handle::isocoat_body;
+use super::pointer::Out;
+use super::status::{Checked, ISOCOAT_ERROR_UNSUPPORTED, Refusal, isocoat_status};
+use crate::world::{BodyId, LogLevel, Response, Scheme, World, WorldDesc};
+
+/// How contact forces act on the links in time: an ISOCOAT_RESPONSE_ value.
+pub type isocoat_response = u32;
+/// The library chooses; today always ISOCOAT_RESPONSE_SUBSTEPPED.
+pub const ISOCOAT_RESPONSE_AUTO: isocoat_response = 0;
+/// One evaluation of the forces a step, at its beginning: for small steps only.
+pub const ISOCOAT_RESPONSE_EXPLICIT: isocoat_response = 1;
+/// One implicit solve a step. Not in this version: gives ISOCOAT_ERROR_UNSUPPORTED.
+pub const ISOCOAT_RESPONSE_IMPLICIT: isocoat_response = 2;
+/// Many small steps inside each step; host-driven links through a mirror that lasts from step to step.
+pub const ISOCOAT_RESPONSE_SUBSTEPPED: isocoat_response = 3;
+
+/// How a contact surface is integrated: an ISOCOAT_SCHEME_ value.
+pub type isocoat_scheme = u32;
+/// The cheapest that meets the tolerance.
+pub const ISOCOAT_SCHEME_AUTO: isocoat_scheme = 0;
+/// Closed form; pairs without one take ISOCOAT_SCHEME_POLAR.
+pub const ISOCOAT_SCHEME_CLOSED_FORM: isocoat_scheme = 1;
+/// A polar Gauss patch round the deepest point.
+pub const ISOCOAT_SCHEME_POLAR: isocoat_scheme = 2;
+/// Subdivision that adapts to the border of the contact.
+pub const ISOCOAT_SCHEME_ADAPTIVE: isocoat_scheme = 3;
+/// Seeds on the surfaces, as in the papers.
+pub const ISOCOAT_SCHEME_SEEDS: isocoat_scheme = 4;
+
+/// How much a message matters: an ISOCOAT_LOG_ value. More may come.
+pub type isocoat_log_level = u32;
+/// Worth knowing.
+pub const ISOCOAT_LOG_INFO: isocoat_log_level = 0;
+/// The scene cannot do what it seems to be meant to.
+pub const ISOCOAT_LOG_WARNING: isocoat_log_level = 1;
+
+/// Settings of a world. Begin with isocoat_world_desc_default().
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub struct isocoat_world_desc {
+    /// Size of this struct in bytes, as the host knows it.
+    pub struct_size: u32,
+    /// How contact forces act in time. Default ISOCOAT_RESPONSE_AUTO.
+    pub response: isocoat_response,
+    /// How contact surfaces are integrated. Default ISOCOAT_SCHEME_AUTO.
+    pub scheme: isocoat_scheme,
+    /// Seeds of a skeleton that does not say its own number: from 4 to 65536. Default 64.
+    pub seed_count: u32,
+    /// Upper bound of the sub-steps in one step: from 1 to 65536. Default 4096.
+    pub max_substeps: u32,
+    /// Acceleration of gravity, in m/s^2, finite. Default 0.
+    pub gravity: [f64; 3],
+    /// Relative error accepted in a contact force: from 1e-9 to 0.5. Default 5e-3.
+    pub force_tolerance: f64,
+    /// Largest product of contact frequency and sub-step, in rad: from 0.01 to 1. Default 0.2.
+    pub substep_phase: f64,
+}
+
+// SAFETY: `repr(C)`, the size first, integers and doubles only.
+unsafe impl Descriptor for isocoat_world_desc {
+    const NAME: &'static str = "isocoat_world_desc";
+    const FIRST_SIZE: usize = offset_of!(Self, substep_phase) + size_of::<f64>();
+
+    fn defaults() -> Self {
+        Self::from(&WorldDesc::default())
+    }
+}
+
+impl From<&WorldDesc> for isocoat_world_desc {
+    fn from(desc: &WorldDesc) -> Self {
+        Self {
+            struct_size: 0,
+            response: match desc.response {
+                Response::Auto => ISOCOAT_RESPONSE_AUTO,
+                Response::Explicit => ISOCOAT_RESPONSE_EXPLICIT,
+                Response::Substepped => ISOCOAT_RESPONSE_SUBSTEPPED,
+            },
+            scheme: scheme_to_c(desc.scheme),
+            seed_count: desc.seed_count,
+            max_substeps: desc.max_substeps,
+            gravity: desc.gravity.into(),
+            force_tolerance: desc.force_tolerance,
+            substep_phase: desc.substep_phase,
+        }
+    }
+}
+
+impl isocoat_world_desc {
+    fn to_rust(self) -> Checked<WorldDesc> {
+        let response = match self.response {
+            ISOCOAT_RESPONSE_AUTO => Response::Auto,
+            ISOCOAT_RESPONSE_EXPLICIT => Response::Explicit,
+            ISOCOAT_RESPONSE_SUBSTEPPED => Response::Substepped,
+            ISOCOAT_RESPONSE_IMPLICIT => {
+                let message = "response is ISOCOAT_RESPONSE_IMPLICIT (2), which this version lacks; take \
+                               ISOCOAT_RESPONSE_SUBSTEPPED (3)";
+                return Err(Refusal::new(ISOCOAT_ERROR_UNSUPPORTED, message));
+            }
+            other => return Err(unknown("response", other, "ISOCOAT_RESPONSE_", 3)),
+        };
+        Ok(WorldDesc {
+            gravity: self.gravity.into(),
+            response,
+            scheme: scheme_from_c(self.scheme)?,
+            force_tolerance: self.force_tolerance,
+            seed_count: self.seed_count,
+            max_substeps: self.max_substeps,
+            substep_phase: self.substep_phase,
+        })
+    }
+}
+
+/// Refuses a value of an enum.
+pub(super) fn unknown(name: &str, value: u32, prefix: &str, last: u32) -> Refusal {
+    Refusal::argument(format!("{name} is {value}; must be one of {prefix}*, 0 to {last}"))
+}
+
+pub(super) fn scheme_to_c(scheme: Scheme) -> isocoat_scheme {
+    match scheme {
+        Scheme::Auto => ISOCOAT_SCHEME_AUTO,
+        Scheme::ClosedForm => ISOCOAT_SCHEME_CLOSED_FORM,
+        Scheme::Polar => ISOCOAT_SCHEME_POLAR,
+        Scheme::Adaptive => ISOCOAT_SCHEME_ADAPTIVE,
+        Scheme::Seeds => ISOCOAT_SCHEME_SEEDS,
+    }
+}
+
+pub(super) fn scheme_from_c(scheme: isocoat_scheme) -> Checked<Scheme> {
+    Ok(match scheme {
+        ISOCOAT_SCHEME_AUTO => Scheme::Auto,
+        ISOCOAT_SCHEME_CLOSED_FORM => Scheme::ClosedForm,
+        ISOCOAT_SCHEME_POLAR => Scheme::Polar,
+        ISOCOAT_SCHEME_ADAPTIVE => Scheme::Adaptive,
+        ISOCOAT_SCHEME_SEEDS => Scheme::Seeds,
+        other => return Err(unknown("scheme", other, "ISOCOAT_SCHEME_", 4)),
+    })
+}
+
+/// Fills a descriptor with its defaults; isocoat_world_desc_default() calls it.
+///
+/// - desc: receives at most size bytes, its struct_size among them; not NULL.
+/// - size: sizeof(isocoat_world_desc) as the host was compiled.
+///
+/// Errors: INVALID_ARGUMENT. Threads: any.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn isocoat_world_desc_init(desc: *mut isocoat_world_desc, size: size_t) -> isocoat_status {
+    // SAFETY: the host gives `size` bytes.
+    free(|| unsafe { descriptor::init(desc, size, "desc") })
+}
+
+/// Creates an empty world.
+///
+/// - desc: settings; not NULL.
+/// - world: receives the world; not NULL. Destroy it with isocoat_world_destroy.
+///
+/// Errors: INVALID_ARGUMENT, OUT_OF_RANGE, UNSUPPORTED. Threads: any.
+#[must_use]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn isocoat_world_create(
+    desc: *const isocoat_world_desc,
+    world: *mut *mut isocoat_world,
+) -> isocoat_status {
+    free(|| {
+        // SAFETY: both are NULL or as their lines say.
+        let (desc, out) = unsafe { (descriptor::read(desc, "desc")?, Out::new(world, "world")?) };
+        let world = World::new(desc.to_rust()?)?;
+        out.put(Box::into_raw(Box::new(isocoat_world::new(world))));
+        Ok(())
+    })
+}
+
+/// Destroys a world with all it owns. Its handles, views and the pointer itself are void afterwards.
+///
+/// - world: NULL does nothing.
+///
+/// Errors: LOCKED while the world is used, its own callbacks included; it then lives on. Poisoned worlds are destroyed
+/// too. Threads: changes the world.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn isocoat_world_destroy(world: *mut isocoat_world) -> isocoat_status {
+    // SAFETY: NULL, or made by `isocoat_world_create` and not destroyed yet.
+    unsafe { guard::destroy(world) }
+}
+
+/// Advances a world: contacts, forces, and the motion of the links that the library integrates. Voids the views of the
+/// step before.
+///
+/// - world: not NULL.
+/// - dt: length of the step, in s, > 0 and at most 10.
+///
+/// Errors: OUT_OF_RANGE. Threads: changes the world; the log callback and the pair filter are called from here.
+#[must_use]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn isocoat_world_step(world: *mut isocoat_world, dt: f64) -> isocoat_status {
+    let step = |inner: &mut guard::Inner| {
+        inner.world.step(dt)?;
+        inner.views.refresh(&inner.world);
+        Ok(())
+    };
+    // SAFETY: NULL or a live world.
+    unsafe { write(world, step) }
+}
+
+/// The settings of a world.
+///
+/// - world: not NULL.
+/// - desc: receives them; not NULL, with struct_size set.
+///
+/// Errors: INVALID_ARGUMENT. Threads: reads the world.
+#[must_use]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn isocoat_world_get_desc(
+    world: *const isocoat_world,
+    desc: *mut isocoat_world_desc,
+) -> isocoat_status {
+    // SAFETY: the pointers are NULL or as their lines say.
+    unsafe {
+        read(world, |inner| {
+            let out = OutStruct::new(desc, "desc")?;
+            out.put(&inner.world.desc().into());
+            Ok(())
+        })
+    }
+}
+
+/// Changes the settings of a world, from the next step on.
+///
+/// - world: not NULL.
+/// - desc: the new settings; not NULL.
+///
+/// Errors: INVALID_ARGUMENT, OUT_OF_RANGE, UNSUPPORTED. Threads: changes the world.
+#[must_use]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn isocoat_world_set_desc(
+    world: *mut isocoat_world,
+    desc: *const isocoat_world_desc,
+) -> isocoat_status {
+    // SAFETY: the pointers are NULL or as their lines say.
+    unsafe { write(world, |inner| Ok(inner.world.set_desc(descriptor::read(desc, "desc")?.to_rust()?)?)) }
+}
+
+/// Receives the messages of a world, on the thread of the call that has something to say.
+///
+/// - context: as given to isocoat_world_set_log.
+/// - level: an ISOCOAT_LOG_ value.
+/// - message: UTF-8; valid during the call.
+///
+/// It must return (no longjmp, no exception); calls on the world from here give ISOCOAT_ERROR_LOCKED.
+pub type isocoat_log_fn =
+    Option<unsafe extern "C" fn(context: *mut c_void, level: isocoat_log_level, message: *const c_char)>;
+
+/// Says whether two bodies may touch; called in a step for each pair whose bounds meet, after categories and masks.
+///
+/// - context: as given to isocoat_world_set_pair_filter.
+/// - body_a, body_b: the pair.
+///
+/// It must return (no longjmp, no exception), the same answer for the same pair within a step; calls on the world from
+/// here give ISOCOAT_ERROR_LOCKED.
+pub type isocoat_pair_filter_fn =
+    Option<unsafe extern "C" fn(context: *mut c_void, body_a: isocoat_body, body_b: isocoat_body) -> bool>;
+
+/// A pointer of the host that goes back to the host only.
+#[derive(Clone, Copy)]
+struct Context(*mut c_void);
+
+// SAFETY: never dereferenced here; the host is told on which threads its callbacks run.
+unsafe impl Send for Context {}
+
+impl Context {
+    /// A method, so that closures capture the whole and stay `Send`.
+    fn pointer(self) -> *mut c_void {
+        self.0
+    }
+}
+
+/// Sets who receives the messages of a world. Without one they are dropped; nothing is ever printed.
+///
+/// - world: not NULL.
+/// - log: the function; NULL for none.
+/// - context: given to it, otherwise unused; may be NULL. It must outlive the world or the next set.
+///
+/// Threads: changes the world.
+#[must_use]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn isocoat_world_set_log(
+    world: *mut isocoat_world,
+    log: isocoat_log_fn,
+    context: *mut c_void,
+) -> isocoat_status {
+    let context = Context(context);
+    let set = |inner: &mut guard::Inner| {
+        let Some(log) = log else {
+            inner.world.set_log(None);
+            return Ok(());
+        };
+        let mut text = Vec::new();
+        inner.world.set_log(Some(Box::new(move |level, message: &str| {
+            let level = match level {
+                LogLevel::Info => ISOCOAT_LOG_INFO,
+                LogLevel::Warning => ISOCOAT_LOG_WARNING,
+            };
+            text.clear();
+            text.extend(message.bytes().filter(|byte| *byte != 0));
+            text.push(0);
+            // SAFETY: the host's function takes its own context and a terminated string.
+            outside(|| unsafe { log(context.pointer(), level, text.as_ptr().cast()) });
+        })));
+        Ok(())
+    };
+    // SAFETY: NULL or a live world.
+    unsafe { write(world, set) }
+}
+
+/// Sets who decides about pairs of bodies.
+///
+/// - world: not NULL.
+/// - filter: the function; NULL lets every pair touch that categories and masks allow.
+/// - context: given to it, otherwise unused; may be NULL. It must outlive the world or the next set.
+///
+/// Threads: changes the world.
+#[must_use]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn isocoat_world_set_pair_filter(
+    world: *mut isocoat_world,
+    filter: isocoat_pair_filter_fn,
+    context: *mut c_void,
+) -> isocoat_status {
+    let context = Context(context);
+    let set = |inner: &mut guard::Inner| {
+        let Some(filter) = filter else {
+            inner.world.set_pair_filter(None);
+            return Ok(());
+        };
+        inner.world.set_pair_filter(Some(Box::new(move |a: BodyId, b: BodyId| {
+            // SAFETY: the host's function takes its own context and two handles.
+            outside(|| unsafe { filter(context.pointer(), a.into(), b.into()) })
+        })));
+        Ok(())
+    };
+    // SAFETY: NULL or a live world.
+    unsafe { write(world, set) }
+}

@@ -1,0 +1,88 @@
+//! Broad phase: which bodies' bounds meet.
+
+use crate::math::Vec3;
+
+/// Bounds of a body over a step.
+#[derive(Clone, Copy, Debug)]
+pub struct Bounds {
+    /// Lowest coordinates; negative infinity for a half-space.
+    pub low: Vec3,
+    /// Highest coordinates.
+    pub high: Vec3,
+    /// Slot of the body.
+    pub body: u32,
+}
+
+impl Bounds {
+    fn meets(&self, other: &Bounds) -> bool {
+        (0..3).all(|axis| self.low[axis] <= other.high[axis] && other.low[axis] <= self.high[axis])
+    }
+}
+
+/// Writes the pairs of bodies whose bounds meet, each with its smaller slot first, in ascending order. Reorders the
+/// bounds.
+pub fn pairs(bounds: &mut [Bounds], out: &mut Vec<[u32; 2]>) {
+    out.clear();
+    let axis = widest_axis(bounds);
+    bounds.sort_unstable_by(|a, b| a.low[axis].total_cmp(&b.low[axis]).then(a.body.cmp(&b.body)));
+    for (index, first) in bounds.iter().enumerate() {
+        for second in &bounds[index + 1..] {
+            if second.low[axis] > first.high[axis] {
+                break;
+            }
+            if first.meets(second) {
+                out.push([first.body.min(second.body), first.body.max(second.body)]);
+            }
+        }
+    }
+    out.sort_unstable();
+}
+
+/// The axis along which the bounded bodies are spread most.
+fn widest_axis(bounds: &[Bounds]) -> usize {
+    let (mut count, mut sum, mut square) = (0.0, Vec3::zeros(), Vec3::zeros());
+    for b in bounds.iter().filter(|b| b.low.x.is_finite() && b.high.x.is_finite()) {
+        let middle = (b.low + b.high) * 0.5;
+        count += 1.0;
+        sum += middle;
+        square += middle.component_mul(&middle);
+    }
+    if count == 0.0 {
+        return 0;
+    }
+    let mean = sum / count;
+    (square / count - mean.component_mul(&mean)).imax()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn finds_the_pairs_that_brute_force_finds(boxes in prop::collection::vec(
+            (prop::array::uniform3(-5.0..5.0f64), prop::array::uniform3(0.0..2.0f64), 0..20u8), 0..40))
+        {
+            let mut bounds: Vec<_> = boxes.iter().enumerate().map(|(body, (low, size, plane))| {
+                let (low, size) = (Vec3::from(*low), Vec3::from(*size));
+                let infinite = Vec3::repeat(f64::INFINITY);
+                match plane {
+                    0 => Bounds { low: -infinite, high: infinite, body: body as u32 },
+                    _ => Bounds { low, high: low + size, body: body as u32 },
+                }
+            }).collect();
+            let mut expected = Vec::new();
+            for i in 0..bounds.len() {
+                for j in i + 1..bounds.len() {
+                    if bounds[i].meets(&bounds[j]) {
+                        expected.push([i as u32, j as u32]);
+                    }
+                }
+            }
+            let mut found = Vec::new();
+            pairs(&mut bounds, &mut found);
+            prop_assert_eq!(found, expected);
+        }
+    }
+}

@@ -1,0 +1,211 @@
+//! Columns: the contact surface as a height over a plane, for the schemes that integrate it there.
+//!
+//! A frame is put on the deepest point; over each point of its plane the surface is the root of `Φ` along the normal.
+//! A column costs one or two evaluations, since the height is guessed from its neighbours and `σ` is extrapolated
+//! along the last Newton step, whose error is of second order.
+
+use super::deepest::Deepest;
+use super::pair::{Pair, Sample};
+use super::patch::Node;
+use crate::math::Vec3;
+
+/// A frame on the contact surface; lengths along `u` and `v` are in units of `scale`.
+#[derive(Clone, Copy, Debug)]
+pub struct Frame {
+    /// Origin, in the pair's frame.
+    pub origin: Vec3,
+    /// Unit vector along the heights, from a to b.
+    pub normal: Vec3,
+    /// First axis in the plane, a unit vector.
+    pub u: Vec3,
+    /// Second axis in the plane, a unit vector.
+    pub v: Vec3,
+    /// Length of a unit of the first and the second coordinate \[m\].
+    pub scale: [f64; 2],
+}
+
+/// The surface over a point of the plane.
+#[derive(Clone, Copy, Debug)]
+pub struct Column {
+    /// Height over the plane \[m\].
+    pub height: f64,
+    /// `σ` on the surface.
+    pub sum: f64,
+    /// Both fields at the last evaluation, a Newton step away from the surface at most.
+    pub sample: Sample,
+}
+
+impl Frame {
+    /// A frame on a deepest point.
+    pub fn new(at: &Deepest, scale: [f64; 2]) -> Self {
+        Self { origin: at.position, normal: at.normal, u: at.axes[0], v: at.axes[1], scale }
+    }
+
+    /// The point at coordinates `(x, y)` and a height.
+    #[inline]
+    pub fn point(&self, x: f64, y: f64, height: f64) -> Vec3 {
+        self.origin + self.u * (x * self.scale[0]) + self.v * (y * self.scale[1]) + self.normal * height
+    }
+
+    /// Coordinates and height of a point.
+    pub fn coordinates(&self, p: &Vec3) -> (f64, f64, f64) {
+        let d = p - self.origin;
+        (d.dot(&self.u) / self.scale[0], d.dot(&self.v) / self.scale[1], d.dot(&self.normal))
+    }
+
+    /// Area of a unit of the coordinates \[m²\].
+    pub fn unit_area(&self) -> f64 {
+        self.scale[0] * self.scale[1]
+    }
+}
+
+/// What a column needs besides its place.
+pub struct Solver<'a> {
+    /// The two coats.
+    pub pair: &'a Pair,
+    /// The plane and its axes.
+    pub frame: Frame,
+    /// `|Φ|` below which the last Newton step is extrapolated instead of evaluated.
+    pub accept: f64,
+    /// Evaluations so far.
+    pub evaluations: u32,
+}
+
+/// Steepest surface that still counts as a height over the plane, as the cosine of its tilt.
+const STEEPEST: f64 = 0.12;
+
+impl Solver<'_> {
+    /// Finds the surface over `(x, y)` from a guess of its height. `None` where it leans over or is not found.
+    #[inline]
+    pub fn column(&mut self, x: f64, y: f64, guess: f64) -> Option<Column> {
+        let mut height = guess;
+        for _ in 0..12 {
+            let point = self.frame.point(x, y, height);
+            let sample = self.pair.sample(&point);
+            self.evaluations += 1;
+            let fall = -sample.difference_gradient.dot(&self.frame.normal);
+            if fall <= STEEPEST * sample.difference_gradient.norm() {
+                return None;
+            }
+            let step = sample.difference / fall;
+            height += step;
+            if sample.difference.abs() <= self.accept {
+                let sum = sample.sum + step * sample.sum_gradient.dot(&self.frame.normal);
+                return Some(Column { height, sum, sample });
+            }
+        }
+        None
+    }
+
+    /// The node that a column stands for, with `weight` in units of the coordinates; none outside the contact.
+    #[inline]
+    pub fn node(&self, x: f64, y: f64, column: &Column, weight: f64) -> Option<Node> {
+        if column.sum <= 0.0 {
+            return None;
+        }
+        let gradient = column.sample.difference_gradient;
+        let fall = -gradient.dot(&self.frame.normal);
+        // Vector area: n dA = ∇Φ / (∇Φ·normal) times the area in the plane.
+        let vector_area = gradient * (-weight * self.frame.unit_area() / fall);
+        let area = vector_area.norm();
+        let normal = vector_area / area;
+        Some(Node {
+            position: self.frame.point(x, y, column.height),
+            force: vector_area * (self.pair.scale * column.sum),
+            area,
+            stiffness: area * self.pair.normal_stiffness(&column.sample, &normal),
+        })
+    }
+
+    /// Scales the frame so that the border is near the unit circle, and moves its origin to the middle of the patch where
+    /// the pressure is too flat to have a clear maximum.
+    pub fn fit(&mut self, at: &Deepest, extent: f64) -> bool {
+        let flat = 1e-3 * at.slope / extent;
+        let mut predicted = [0.0; 2];
+        for (axis, scale) in predicted.iter_mut().enumerate() {
+            *scale = if at.curvature[axis] < -flat { (2.0 * at.sum / -at.curvature[axis]).sqrt() } else { extent };
+        }
+        let clear = |axis: usize| at.curvature[axis] < -flat && predicted[axis] < 0.5 * extent;
+        self.frame.scale = predicted;
+        if clear(0) && clear(1) {
+            return true;
+        }
+        // Two rounds: the middle across the first axis depends on where the second one ends.
+        for _ in 0..2 {
+            for axis in 0..2 {
+                if clear(axis) {
+                    continue;
+                }
+                let mut ends = [0.0; 2];
+                for (end, sign) in ends.iter_mut().zip([1.0, -1.0]) {
+                    let direction = if axis == 0 { (sign, 0.0) } else { (0.0, sign) };
+                    let Some((s, _)) = self.border(direction, at.sum, 0.0) else { return false };
+                    *end = s * sign;
+                }
+                let middle = 0.5 * (ends[0] + ends[1]);
+                let (x, y) = if axis == 0 { (middle, 0.0) } else { (0.0, middle) };
+                let Some(column) = self.column(x, y, 0.0) else { return false };
+                self.frame.origin = self.frame.point(x, y, column.height);
+                self.frame.scale[axis] *= 0.5 * (ends[0] - ends[1]);
+            }
+        }
+        true
+    }
+
+    /// The border along a direction of the frame: its radius and height. Newton on `Φ = σ = 0` in the half-plane, kept
+    /// between a point inside the contact and, once seen, one outside.
+    pub fn border(&mut self, (dx, dy): (f64, f64), peak: f64, guess: f64) -> Option<(f64, f64)> {
+        let frame = self.frame;
+        let along = frame.u * (dx * frame.scale[0]) + frame.v * (dy * frame.scale[1]);
+        let (mut inside, mut outside) = (0.0, f64::INFINITY);
+        let (mut s, mut z) = (1.0, guess);
+        for _ in 0..40 {
+            let sample = self.pair.sample(&(frame.origin + along * s + frame.normal * z));
+            self.evaluations += 1;
+            let (phi_s, phi_z) =
+                (sample.difference_gradient.dot(&along), sample.difference_gradient.dot(&frame.normal));
+            let (sum_s, sum_z) = (sample.sum_gradient.dot(&along), sample.sum_gradient.dot(&frame.normal));
+            let determinant = phi_z * sum_s - phi_s * sum_z;
+            let settled = sample.difference.abs() < 0.1 * peak;
+            // Along the surface, σ changes by `determinant / phi_z` a unit of s.
+            let rate = if phi_z < 0.0 { determinant / phi_z } else { 0.0 };
+            let on_surface = sample.sum - sample.difference * sum_z / if phi_z < 0.0 { phi_z } else { -1.0 };
+            if settled && phi_z < 0.0 {
+                if on_surface > 0.0 {
+                    inside = s;
+                } else {
+                    outside = outside.min(s);
+                }
+            } else if phi_z >= 0.0 {
+                // No surface over this point.
+                outside = outside.min(s);
+            }
+            let mut next = if rate < 0.0 { s - on_surface / rate } else { f64::INFINITY };
+            let upper = if outside.is_finite() { outside } else { 2.0 * s.max(0.05) };
+            if !(next > inside && next < upper) {
+                next = if outside.is_finite() { 0.5 * (inside + outside) } else { upper };
+            }
+            let step = next - s;
+            if phi_z < 0.0 {
+                z -= (sample.difference + phi_s * step) / phi_z;
+            } else {
+                z *= next / s;
+            }
+            s = next;
+            if settled && rate < 0.0 && step.abs() <= BORDER_STEP * s && on_surface.abs() < 0.3 * peak {
+                return Some((s, z));
+            }
+            if outside - inside <= 1e-9 * s {
+                return (rate < 0.0).then_some((s, z));
+            }
+            if s > 1e3 {
+                return None;
+            }
+        }
+        None
+    }
+}
+
+/// Relative Newton step below which the border is taken without another look: what is left is its square, and the
+/// force changes with the square of that, since the pressure vanishes there.
+const BORDER_STEP: f64 = 0.03;

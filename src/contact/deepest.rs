@@ -1,0 +1,161 @@
+//! Discovery: the deepest points of a contact, found from the closest points of two primitives, so that no contact is
+//! too narrow to be found.
+
+use super::pair::{Pair, Sample};
+use crate::field::{Shape, skeleton::closest_points};
+use crate::math::{Vec3, tangents};
+
+/// A local maximum of the pressure on the contact surface, and the surface's shape there.
+#[derive(Clone, Copy, Debug)]
+pub struct Deepest {
+    /// Where, in the pair's frame.
+    pub position: Vec3,
+    /// Unit normal of the surface, from a to b.
+    pub normal: Vec3,
+    /// Principal directions of the pressure along the surface.
+    pub axes: [Vec3; 2],
+    /// Second derivatives of `σ` along them \[1/m²\]: negative where it falls off.
+    pub curvature: [f64; 2],
+    /// `σ` here: positive in contact.
+    pub sum: f64,
+    /// Rate at which `σ`'s two parts change across the surface, `|∇σ|` at most \[1/m\].
+    pub slope: f64,
+    /// The skeletons it was found from.
+    pub skeletons: [usize; 2],
+    /// Evaluations it took.
+    pub evaluations: u32,
+}
+
+/// Two primitives where they come closest.
+#[derive(Clone, Copy, Debug)]
+pub struct Approach {
+    /// Distance; negative when one reaches into the other's solid core \[m\].
+    pub distance: f64,
+    /// Unit vector from a to b.
+    pub direction: Vec3,
+    /// Where two isolated coats with linear profiles would meet at equal pressure.
+    pub meeting: Vec3,
+}
+
+/// Where skeletons `i` of a and `j` of b come closest.
+pub fn approach(pair: &Pair, i: usize, j: usize) -> Approach {
+    let (a, b) = (&pair.a.skeletons[i], &pair.b.skeletons[j]);
+    let (on_a, on_b) = closest_points(&a.shape, &b.shape);
+    let (distance, direction, from) = match (&a.shape, &b.shape) {
+        (_, Shape::Plane { normal, .. }) => (b.shape.closest(&on_a).distance, -normal, on_a),
+        (Shape::Plane { normal, .. }, _) => {
+            let distance = a.shape.closest(&on_b).distance;
+            (distance, *normal, on_b - normal * distance)
+        }
+        _ if (on_b - on_a).norm() > 1e-12 * (on_a.norm() + on_b.norm()) => {
+            let apart = on_b - on_a;
+            (apart.norm(), apart.normalize(), on_a)
+        }
+        // The cores meet: the way out is the shorter of the two to the other's middle.
+        _ => {
+            let (into_a, into_b) = (a.shape.closest(&b.shape.middle()), b.shape.closest(&a.shape.middle()));
+            if into_b.distance >= into_a.distance {
+                (into_b.distance.min(0.0), -into_b.normal, on_a)
+            } else {
+                (into_a.distance.min(0.0), into_a.normal, on_a)
+            }
+        }
+    };
+    let direction = if direction == Vec3::zeros() { Vec3::z() } else { direction };
+    let (ta, tb) = (a.profile.thickness, b.profile.thickness);
+    let (sa, sb) = (pair.a.slope(i), pair.b.slope(j));
+    let along = if sa.is_infinite() {
+        ta
+    } else if sb.is_infinite() {
+        distance - tb
+    } else {
+        (sa * ta - sb * tb + sb * distance) / (sa + sb)
+    };
+    Approach { distance, direction, meeting: from + direction * along }
+}
+
+/// Climbs to the deepest point from where two skeletons come closest. `None` when they do not touch.
+pub fn find(pair: &Pair, i: usize, j: usize, from: &Approach) -> Option<Deepest> {
+    let mut position = from.meeting;
+    let size = pair.a.skeletons[i].profile.thickness.min(pair.b.skeletons[j].profile.thickness);
+    let mut trust = 0.5 * size;
+    let mut evaluations = 0;
+    let mut best: Option<Deepest> = None;
+    for _ in 0..24 {
+        let (sample, hessian) = pair.sample_hessian(&position);
+        evaluations += 1;
+        let normal = sample.normal()?;
+        let slope = sample.difference_gradient.norm();
+        let across = sample.difference / slope;
+        let (e1, e2) = tangents(&normal);
+        let reduce = |u: &Vec3, v: &Vec3| u.dot(&(hessian * v));
+        let (h11, h12, h22) = (reduce(&e1, &e1), reduce(&e1, &e2), reduce(&e2, &e2));
+        let (axes, curvature) = principal(&e1, &e2, h11, h12, h22);
+        // On the surface the sum is what the first order predicts there.
+        let sum = sample.sum + across * sample.sum_gradient.dot(&normal);
+        let settled = across.abs() <= 1e-4 * size;
+        let found = Deepest {
+            position: position + normal * across,
+            normal,
+            axes,
+            curvature,
+            sum,
+            slope: sample.gradient_a.norm().max(sample.gradient_b.norm()),
+            skeletons: [i, j],
+            evaluations,
+        };
+        if let Some(previous) = &best
+            && settled
+            && sum < previous.sum - 1e-9 * previous.sum.abs()
+        {
+            // Overshot: go back half way.
+            trust *= 0.25;
+            if trust < 1e-6 * size {
+                break;
+            }
+            position = 0.5 * (position + previous.position);
+            continue;
+        }
+        let step = climb(&found, &sample, trust);
+        if settled {
+            best = Some(found);
+            if step.norm() <= 1e-3 * size {
+                break;
+            }
+        }
+        position += normal * across.clamp(-2.0 * size, 2.0 * size) + step;
+    }
+    let mut found = best?;
+    found.evaluations = evaluations;
+    (found.sum > 0.0).then_some(found)
+}
+
+/// Eigenvectors and eigenvalues of the 2×2 matrix of second derivatives in the plane of `e1`, `e2`.
+fn principal(e1: &Vec3, e2: &Vec3, h11: f64, h12: f64, h22: f64) -> ([Vec3; 2], [f64; 2]) {
+    let (mean, half) = (0.5 * (h11 + h22), 0.5 * (h11 - h22));
+    let radius = half.hypot(h12);
+    if radius <= 1e-9 * mean.abs() {
+        return ([*e1, *e2], [mean, mean]);
+    }
+    let angle = 0.5 * libm::atan2(h12, half);
+    let (sine, cosine) = (libm::sin(angle), libm::cos(angle));
+    ([e1 * cosine + e2 * sine, e2 * cosine - e1 * sine], [mean + radius, mean - radius])
+}
+
+/// A Newton step towards the maximum along the surface, cut to the trust radius.
+fn climb(at: &Deepest, sample: &Sample, trust: f64) -> Vec3 {
+    let mut step = Vec3::zeros();
+    for (axis, curvature) in at.axes.iter().zip(at.curvature) {
+        let gradient = sample.sum_gradient.dot(axis);
+        let flat = 1e-3 * at.slope / trust.max(1e-300);
+        let along = if curvature < -flat {
+            -gradient / curvature
+        } else if gradient.abs() > 1e-6 * at.slope {
+            gradient.signum() * trust
+        } else {
+            0.0
+        };
+        step += axis * along.clamp(-trust, trust);
+    }
+    step
+}

@@ -1,0 +1,206 @@
+//! Two coats in one local frame: what every scheme asks about a point.
+//!
+//! With `α = f_a - c_a`, `β = f_b - c_b` and pressures `K_a α`, `K_b β`, the contact surface is where
+//!
+//! - the difference `Φ = w_a α - w_b β` is zero, `w_a = K_a / (K_a + K_b)`, `w_b = 1 - w_a` (rigid b: 0 and 1), and
+//! - the sum `σ = α + β` is positive, which ends at the border of the contact.
+//!
+//! On that surface the pressure is `p = K σ` with `1/K = 1/K_a + 1/K_b`: one formula for every ratio of stiffness and
+//! for rigid bodies, without the cancellation of `K_a α` (docs/model.md, "Contact surface").
+
+use crate::base::Motion;
+use crate::coat::seeds::Ray;
+use crate::field::{Placed, Shape, blend};
+use crate::math::{Mat3, Pose, Vec3};
+use std::sync::Arc;
+
+/// Ratio of stiffness beyond which the stiffer of two deformable bodies counts as rigid.
+pub const RIGID_RATIO: f64 = 1e6;
+
+/// One body of a pair, in the pair's frame.
+#[derive(Debug, Default)]
+pub struct Side {
+    /// The skeletons that can matter for this pair, as placed by [`Pair::place`].
+    pub skeletons: Vec<Placed>,
+    /// Their shapes in their links' frames.
+    pub locals: Vec<Shape>,
+    /// For each skeleton, its slot in the world.
+    pub ids: Vec<u32>,
+    /// For each skeleton, its link's slot in the world.
+    pub links: Vec<u32>,
+    /// For each skeleton, how far from it the surface may lie.
+    pub reach: Vec<f64>,
+    /// For each skeleton, its link's pose in the pair's frame.
+    pub poses: Vec<Pose>,
+    /// For each skeleton, its rays in its link's frame; empty unless the scene samples with seeds.
+    pub rays: Vec<Arc<[Ray]>>,
+    /// Field value on the surface.
+    pub isovalue: f64,
+    /// Pressure a unit of field \[Pa\].
+    pub stiffness_scale: f64,
+    /// The body keeps its shape.
+    pub rigid: bool,
+}
+
+impl Side {
+    /// Forgets the skeletons, keeps the memory.
+    pub fn clear(&mut self) {
+        self.skeletons.clear();
+        self.locals.clear();
+        self.ids.clear();
+        self.links.clear();
+        self.reach.clear();
+        self.poses.clear();
+        self.rays.clear();
+    }
+
+    /// `f - c` and its gradient.
+    #[inline]
+    pub fn excess(&self, p: &Vec3) -> (f64, Vec3) {
+        let (value, gradient) = blend::value_gradient(&self.skeletons, p);
+        (value - self.isovalue, gradient)
+    }
+
+    fn excess_hessian(&self, p: &Vec3) -> (f64, Vec3, Mat3) {
+        let (value, gradient, hessian) = blend::value_gradient_hessian(&self.skeletons, p);
+        (value - self.isovalue, gradient, hessian)
+    }
+
+    /// Puts the skeletons where their links are, in a frame at `origin` with the world's axes.
+    pub fn place(&mut self, motions: &[Motion], origin: &Vec3) {
+        for (index, link) in self.links.iter().enumerate() {
+            let motion = &motions[*link as usize];
+            let pose = Pose {
+                // The difference of the centres is exact where the sum of pose and origin would not be.
+                position: (motion.center - origin) - motion.rotation * motion.local_center,
+                rotation: motion.rotation,
+            };
+            self.poses[index] = pose;
+            self.skeletons[index].shape = self.locals[index].transformed(&pose);
+        }
+    }
+
+    /// The only link of the side, when there is only one.
+    pub fn only_link(&self) -> Option<u32> {
+        let first = *self.links.first()?;
+        self.links.iter().all(|link| *link == first).then_some(first)
+    }
+
+    /// Pressure a metre of depth at the surface of a skeleton \[Pa/m\]; infinite for a rigid body.
+    pub fn slope(&self, skeleton: usize) -> f64 {
+        if self.rigid { f64::INFINITY } else { self.stiffness_scale * self.skeletons[skeleton].profile.stiffness }
+    }
+}
+
+/// Two bodies of which at least one is deformable.
+#[derive(Debug, Default)]
+pub struct Pair {
+    /// The first body.
+    pub a: Side,
+    /// The second body.
+    pub b: Side,
+    wa: f64,
+    wb: f64,
+    /// Pressure a unit of `σ` \[Pa\].
+    pub scale: f64,
+    /// Origin of the pair's frame in the world, so that nothing is lost far from the world's own.
+    pub origin: Vec3,
+}
+
+/// Both fields at a point.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Sample {
+    /// `Φ`: positive on a's side of the contact surface.
+    pub difference: f64,
+    /// Its gradient.
+    pub difference_gradient: Vec3,
+    /// `σ`: positive where the coats overlap, on the surface.
+    pub sum: f64,
+    /// Its gradient.
+    pub sum_gradient: Vec3,
+    /// Gradient of `α`.
+    pub gradient_a: Vec3,
+    /// Gradient of `β`.
+    pub gradient_b: Vec3,
+}
+
+impl Sample {
+    /// The unit normal from a to b, `-∇Φ/|∇Φ|`; `None` where the gradient vanishes.
+    pub fn normal(&self) -> Option<Vec3> {
+        let length = self.difference_gradient.norm();
+        (length > 1e-300).then(|| self.difference_gradient / -length)
+    }
+}
+
+impl Pair {
+    /// Sets the weights from the two sides. Call after filling them.
+    pub fn prepare(&mut self) {
+        let (ka, kb) = (self.a.stiffness_scale, self.b.stiffness_scale);
+        // Beyond this ratio the surface is the stiffer body's to the last digits that matter.
+        if !self.a.rigid && !self.b.rigid {
+            self.a.rigid = ka > RIGID_RATIO * kb;
+            self.b.rigid = kb > RIGID_RATIO * ka;
+        }
+        (self.wa, self.wb, self.scale) = match (self.a.rigid, self.b.rigid) {
+            (false, true) => (0.0, 1.0, ka),
+            (true, false) => (1.0, 0.0, kb),
+            _ => (ka / (ka + kb), kb / (ka + kb), ka * kb / (ka + kb)),
+        };
+    }
+
+    /// Puts all skeletons where their links are; the frame's origin goes to the centre of mass of link `lead`.
+    pub fn place(&mut self, motions: &[Motion], lead: u32) {
+        self.origin = motions[lead as usize].center;
+        self.a.place(motions, &self.origin);
+        self.b.place(motions, &self.origin);
+    }
+
+    fn combine(&self, (alpha, ga): (f64, Vec3), (beta, gb): (f64, Vec3)) -> Sample {
+        Sample {
+            difference: self.wa * alpha - self.wb * beta,
+            difference_gradient: ga * self.wa - gb * self.wb,
+            sum: alpha + beta,
+            sum_gradient: ga + gb,
+            gradient_a: ga,
+            gradient_b: gb,
+        }
+    }
+
+    /// Evaluates both fields at a point.
+    #[inline]
+    pub fn sample(&self, p: &Vec3) -> Sample {
+        self.combine(self.a.excess(p), self.b.excess(p))
+    }
+
+    /// Evaluates both fields, and the Hessian of `σ` along the surface: that of the Lagrangian `σ + λ Φ` with the
+    /// multiplier that makes its gradient tangential.
+    pub fn sample_hessian(&self, p: &Vec3) -> (Sample, Mat3) {
+        let (alpha, ga, ha) = self.a.excess_hessian(p);
+        let (beta, gb, hb) = self.b.excess_hessian(p);
+        let sample = self.combine((alpha, ga), (beta, gb));
+        let square = sample.difference_gradient.norm_squared();
+        if square < 1e-300 {
+            return (sample, ha + hb);
+        }
+        let lambda = -sample.sum_gradient.dot(&sample.difference_gradient) / square;
+        (sample, ha * (1.0 + lambda * self.wa) + hb * (1.0 - lambda * self.wb))
+    }
+
+    /// The part of `-∇Φ` that the partner of a ray's body brings: `w_b ∇β` for a's rays, `w_a ∇α` for b's.
+    pub fn others_part(&self, sample: &Sample, from_a: bool) -> Vec3 {
+        if from_a { sample.gradient_b * self.wb } else { sample.gradient_a * self.wa }
+    }
+
+    /// Stiffness an area of the contact surface along its normal, `g_a g_b / (g_a + g_b)` with `g = K |∇f·n|`
+    /// \[Pa/m\].
+    pub fn normal_stiffness(&self, sample: &Sample, normal: &Vec3) -> f64 {
+        let ga = self.a.stiffness_scale * sample.gradient_a.dot(normal).abs();
+        let gb = self.b.stiffness_scale * sample.gradient_b.dot(normal).abs();
+        match (self.a.rigid, self.b.rigid) {
+            (false, true) => ga,
+            (true, false) => gb,
+            _ if ga + gb > 0.0 => ga * gb / (ga + gb),
+            _ => 0.0,
+        }
+    }
+}

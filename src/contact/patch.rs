@@ -1,0 +1,76 @@
+//! Patches: the pieces of contact surface that the schemes produce, as weighted points, and what they sum up to.
+
+use super::Scheme;
+use crate::math::Vec3;
+
+/// A weighted point of a contact surface, in the pair's frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Node {
+    /// Where.
+    pub position: Vec3,
+    /// Elastic force on b: pressure times vector area \[N\].
+    pub force: Vec3,
+    /// Area \[m²\].
+    pub area: f64,
+    /// Normal stiffness, `g_a g_b / (g_a + g_b)` times the area \[N/m\].
+    pub stiffness: f64,
+}
+
+/// One connected piece of contact surface.
+#[derive(Clone, Copy, Debug)]
+pub struct Patch {
+    /// The skeletons whose territories hold the deepest point, as positions in the pair's sides.
+    pub skeletons: [usize; 2],
+    /// The deepest point, in the pair's frame.
+    pub deepest: Vec3,
+    /// The normal there, from a to b.
+    pub normal: Vec3,
+    /// Pressure there \[Pa\].
+    pub peak_pressure: f64,
+    /// First and last-plus-one of its nodes.
+    pub nodes: (usize, usize),
+    /// Estimated relative error of the force.
+    pub error_estimate: f64,
+    /// Evaluations of the two fields.
+    pub evaluations: u32,
+    /// Who integrated it.
+    pub scheme: Scheme,
+    /// Past the most that the contact can carry; see [`overload`](super::overload).
+    pub overloaded: bool,
+}
+
+/// Sums over nodes.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Sums {
+    /// Force on b \[N\].
+    pub force: Vec3,
+    /// Centre of pressure, in the pair's frame.
+    pub center: Vec3,
+    /// Torque on b about the centre \[N m\].
+    pub torque: Vec3,
+    /// Area \[m²\].
+    pub area: f64,
+    /// Normal stiffness \[N/m\].
+    pub stiffness: f64,
+}
+
+/// Sums the nodes of one patch.
+pub fn sum(nodes: &[Node]) -> Sums {
+    let mut sums = Sums::default();
+    let mut load = 0.0;
+    for node in nodes {
+        let magnitude = node.force.norm();
+        sums.force += node.force;
+        sums.center += node.position * magnitude;
+        load += magnitude;
+        sums.area += node.area;
+        sums.stiffness += node.stiffness;
+    }
+    if load > 0.0 {
+        sums.center /= load;
+    }
+    for node in nodes {
+        sums.torque += (node.position - sums.center).cross(&node.force);
+    }
+    sums
+}

@@ -1,0 +1,252 @@
+//! The polar patch: a Gauss rule in polar coordinates round the deepest point.
+//!
+//! The patch is the star-shaped piece of contact surface round its deepest point. In coordinates scaled by the
+//! pressure's principal curvatures its border is nearly a circle; azimuths are equally spaced, which converges fast for
+//! a smooth border, and along each the radii are the Gauss rule for the weight `s` that knows the pressure to be zero
+//! at the border. The frame comes from the contact alone, so turning a body in place changes nothing.
+
+use super::column::{Frame, Solver};
+use super::deepest::Deepest;
+use super::pair::Pair;
+use super::patch::Node;
+use crate::math::Vec3;
+
+/// A rule for `∫₀¹ f(s) s ds` with `f(1) = 0`, exact to degree `2 n`; and a coarser one on the same points and the
+/// centre, whose difference estimates the error.
+struct Rule {
+    s: &'static [f64],
+    weight: &'static [f64],
+    coarse: &'static [f64],
+    center: f64,
+}
+
+/// Interior Gauss-Lobatto points; weights solved for from the moments of `s`.
+const RULES: [Rule; 6] = [
+    Rule {
+        s: &[0.276_393_202_250_021_03, 0.723_606_797_749_978_97],
+        weight: &[0.115_163_834_270_842_1, 0.301_502_832_395_824_57],
+        coarse: &[0.0, 0.416_666_666_666_666_67],
+        center: 0.051_502_832_395_824_571,
+    },
+    Rule {
+        s: &[0.172_673_164_646_011_43, 0.5, 0.827_326_835_353_988_57],
+        weight: &[0.047_005_472_598_080_889, 0.177_777_777_777_777_78, 0.225_216_749_624_141_33],
+        coarse: &[0.202_561_028_153_636_44, 0.0, 0.380_772_305_179_696_89],
+        center: -0.066_666_666_666_666_667,
+    },
+    Rule {
+        s: &[0.117_472_338_035_267_65, 0.357_384_241_759_677_45, 0.642_615_758_240_322_55, 0.882_527_661_964_732_35],
+        weight: &[
+            0.022_230_169_002_051_916,
+            0.099_148_820_180_416_259,
+            0.178_280_368_337_326_92,
+            0.167_007_309_146_871_57,
+        ],
+        coarse: &[0.104_117_186_004_457_91, 0.0, 0.277_429_188_517_743_18, 0.085_120_292_144_465_582],
+        center: -0.034_367_729_981_066_382,
+    },
+    Rule {
+        s: &[
+            0.084_888_051_860_716_535,
+            0.265_575_603_264_642_89,
+            0.5,
+            0.734_424_396_735_357_11,
+            0.915_111_948_139_283_46,
+        ],
+        weight: &[
+            0.011_749_611_932_412_891,
+            0.057_330_520_035_766_241,
+            0.121_904_761_904_761_9,
+            0.158_542_170_569_165_07,
+            0.126_663_411_748_370_08,
+        ],
+        coarse: &[
+            -0.080_101_372_537_880_131,
+            0.172_038_647_363_202_12,
+            0.0,
+            0.273_250_297_896_600_95,
+            0.034_812_427_278_077_061,
+        ],
+        center: 0.038_095_238_095_238_095,
+    },
+    Rule {
+        s: &[
+            0.064_129_925_745_196_692,
+            0.204_149_909_283_428_85,
+            0.395_350_391_048_760_56,
+            0.604_649_608_951_239_43,
+            0.795_850_090_716_571_15,
+            0.935_870_074_254_803_31,
+        ],
+        weight: &[
+            0.006_756_223_220_456_049_8,
+            0.034_820_083_362_513_206,
+            0.081_532_872_879_909_508,
+            0.124_696_524_449_442_43,
+            0.135_741_262_879_238_98,
+            0.098_595_890_351_296_97,
+        ],
+        coarse: &[
+            -0.051_518_347_830_029_906,
+            0.108_967_797_451_318_41,
+            0.0,
+            0.206_229_397_329_351_94,
+            0.061_593_548_790_433_776,
+            0.156_870_461_401_782_93,
+        ],
+        center: 0.023_991_833_869_792_74,
+    },
+    Rule {
+        s: &[
+            0.040_233_045_916_770_593,
+            0.130_613_067_447_247_46,
+            0.261_037_525_094_777_75,
+            0.417_360_521_166_806_49,
+            0.582_639_478_833_193_51,
+            0.738_962_474_905_222_25,
+            0.869_386_932_552_752_54,
+            0.959_766_954_083_229_41,
+        ],
+        weight: &[
+            0.002_681_653_025_445_852_2,
+            0.014_686_743_401_529_121,
+            0.038_117_049_684_890_845,
+            0.068_351_082_715_281_388,
+            0.095_418_797_876_667_34,
+            0.107_904_292_154_951_03,
+            0.097_757_927_630_034_106,
+            0.063_971_342_400_089_203,
+        ],
+        coarse: &[
+            0.046_286_846_525_767_605,
+            -0.041_949_941_020_773_119,
+            0.102_658_177_434_806_8,
+            0.0,
+            0.163_769_880_591_948_73,
+            0.043_363_164_405_035_074,
+            0.154_394_614_052_336_34,
+            0.020_366_148_899_767_45,
+        ],
+        center: -0.017_803_571_272_317_916,
+    },
+];
+
+/// Azimuths and radial rule, from the cheapest up.
+const LEVELS: [(usize, usize); 8] = [(6, 0), (8, 0), (12, 1), (16, 2), (24, 3), (32, 3), (48, 4), (64, 5)];
+
+/// A patch that was integrated.
+pub struct Integrated {
+    /// Estimated relative error of its force.
+    pub error: f64,
+    /// Evaluations it took.
+    pub evaluations: u32,
+    /// Its frame.
+    pub frame: Frame,
+    /// For each azimuth, the radius of the border in the frame's units.
+    pub border: Vec<f64>,
+}
+
+/// Why the polar patch is not the right scheme here.
+pub struct NotStarShaped {
+    /// Evaluations it took to find out.
+    pub evaluations: u32,
+}
+
+/// Integrates the patch round a deepest point to a relative `tolerance`, appending to `nodes`. At the finest level the
+/// result stands, with its estimate, when `last_resort` is set.
+pub fn integrate(
+    pair: &Pair,
+    at: &Deepest,
+    extent: f64,
+    tolerance: f64,
+    last_resort: bool,
+    nodes: &mut Vec<Node>,
+) -> Result<Integrated, NotStarShaped> {
+    let first = nodes.len();
+    let mut solver = Solver { pair, frame: Frame::new(at, [1.0, 1.0]), accept: 0.0, evaluations: 0 };
+    // The height's error is of second order in what is left of Φ; so is that of the border.
+    solver.accept = 0.15 * at.sum * tolerance.sqrt().min(0.1);
+    let fail = |evaluations, nodes: &mut Vec<Node>| {
+        nodes.truncate(first);
+        Err(NotStarShaped { evaluations })
+    };
+    if !solver.fit(at, extent) {
+        return fail(solver.evaluations, nodes);
+    }
+    let start = match tolerance {
+        t if t >= 2e-2 => 0,
+        t if t >= 2e-3 => 1,
+        t if t >= 2e-4 => 2,
+        _ => 3,
+    };
+    let mut border = Vec::new();
+    for (index, (azimuths, rule)) in LEVELS.iter().enumerate().skip(start) {
+        nodes.truncate(first);
+        border.clear();
+        let Some(error) = sweep(&mut solver, at.sum, *azimuths, &RULES[*rule], &mut border, nodes) else {
+            return fail(solver.evaluations, nodes);
+        };
+        let last = index + 1 == LEVELS.len();
+        if error <= tolerance || last && last_resort {
+            return Ok(Integrated { error, evaluations: solver.evaluations, frame: solver.frame, border });
+        }
+        // Algebraic convergence does not pay here: leave it to the subdivision.
+        if !last_resort && error > 30.0 * tolerance {
+            break;
+        }
+    }
+    fail(solver.evaluations, nodes)
+}
+
+/// Integrates with one rule. Gives the estimated relative error, or `None` when the patch is not star-shaped.
+fn sweep(
+    solver: &mut Solver,
+    peak: f64,
+    azimuths: usize,
+    rule: &Rule,
+    borders: &mut Vec<f64>,
+    nodes: &mut Vec<Node>,
+) -> Option<f64> {
+    let slice = 2.0 * std::f64::consts::PI / azimuths as f64;
+    let center_density = solver.frame.normal * (solver.pair.scale * solver.frame.unit_area());
+    let center = solver.column(0.0, 0.0, 0.0)?;
+    let mut half = [Vec3::zeros(); 2];
+    let mut coarse = Vec3::zeros();
+    let mut height = 0.0;
+    for azimuth in 0..azimuths {
+        let angle = slice * (azimuth as f64 + 0.5);
+        let direction = (libm::cos(angle), libm::sin(angle));
+        let (s, z) = solver.border(direction, peak, height)?;
+        height = z;
+        borders.push(s);
+        let mut line = Vec3::zeros();
+        let mut line_coarse = center_density * (center.sum * rule.center);
+        for (index, x) in rule.s.iter().enumerate() {
+            let r = x * s;
+            let column = solver.column(r * direction.0, r * direction.1, z * x * x)?;
+            if column.sum < -1e-3 * peak {
+                // Out of the contact before its border: there is a bay.
+                return None;
+            }
+            if let Some(node) =
+                solver.node(r * direction.0, r * direction.1, &column, rule.weight[index] * s * s * slice)
+            {
+                line += node.force;
+                line_coarse += node.force * (rule.coarse[index] / (rule.weight[index] * s * s * slice));
+                nodes.push(node);
+            }
+        }
+        half[azimuth % 2] += line;
+        coarse += line_coarse * (s * s * slice);
+    }
+    let force = half[0] + half[1];
+    let size = force.norm();
+    if size <= 0.0 {
+        return Some(0.0);
+    }
+    // Half the azimuths: at least four times the error of all, and far more where the border is smooth.
+    let angular = (half[0] - half[1]).norm() / size;
+    let radial = (coarse - force).norm() / size;
+    let rounding = 1e-14;
+    Some(0.25 * angular + 0.25 * radial + rounding)
+}

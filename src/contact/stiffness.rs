@@ -1,0 +1,73 @@
+//! The largest stiffness that a contact can reach within a step: what the sub-steps must resolve.
+//!
+//! Today's patch does not tell: a ball that is about to hit, or a box that stands on its edge, will be far stiffer in a
+//! moment. So the area is bounded by the shapes: the flat part of a skeleton, a strip along its edges and a cap at its
+//! corners, as wide as the deepest overlap within reach makes them.
+
+use std::f64::consts::PI;
+
+use super::pair::Pair;
+use crate::field::Shape;
+
+/// Flat area, and length of edge round it, that a shape can lay on another.
+struct Footprint {
+    face: f64,
+    edge: f64,
+}
+
+fn footprint(shape: &Shape) -> Option<Footprint> {
+    match shape {
+        Shape::Point(_) => Some(Footprint { face: 0.0, edge: 0.0 }),
+        Shape::Segment(a, b) => Some(Footprint { face: 0.0, edge: 2.0 * (b - a).norm() }),
+        Shape::Triangle(a, b, c) => Some(Footprint {
+            face: 0.5 * (b - a).cross(&(c - a)).norm(),
+            edge: (b - a).norm() + (c - b).norm() + (a - c).norm(),
+        }),
+        Shape::Box { half, .. } => {
+            let mut sides = [2.0 * half.x, 2.0 * half.y, 2.0 * half.z];
+            sides.sort_by(f64::total_cmp);
+            Some(Footprint { face: sides[1] * sides[2], edge: 2.0 * (sides[1] + sides[2]) })
+        }
+        Shape::Plane { .. } => None,
+    }
+}
+
+/// Bounds of a contact of two skeletons.
+#[derive(Clone, Copy, Debug)]
+pub struct Reachable {
+    /// Normal stiffness \[N/m\].
+    pub stiffness: f64,
+    /// Square of the lever that the patch's own size gives it on a turn \[m²\].
+    pub lever2: f64,
+}
+
+/// Bounds for skeletons `i` and `j` when their coats overlap by at most `overlap`.
+pub fn reachable(pair: &Pair, i: usize, j: usize, overlap: f64) -> Reachable {
+    let (a, b) = (&pair.a.skeletons[i], &pair.b.skeletons[j]);
+    let (ta, tb) = (a.profile.thickness, b.profile.thickness);
+    let overlap = overlap.clamp(0.0, ta + tb);
+    // Half width of the strip: the chord of the rounding, of both where both are round all over.
+    let chord2 = |t: f64| (2.0 * t * overlap).min(t * t);
+    let c2 = match (&a.shape, &b.shape) {
+        (Shape::Point(_), Shape::Point(_)) => {
+            let t = ta * tb / (ta + tb);
+            (2.0 * t * overlap).min(ta.min(tb).powi(2))
+        }
+        (_, Shape::Plane { .. }) => chord2(ta),
+        (Shape::Plane { .. }, _) => chord2(tb),
+        _ => chord2(ta).min(chord2(tb)),
+    };
+    let c = c2.sqrt();
+    let area = |shape: &Shape| footprint(shape).map_or(f64::INFINITY, |f| f.face + f.edge * c + PI * c2);
+    let area = area(&a.shape).min(area(&b.shape));
+    let slope = |side: &super::pair::Side, skeleton: usize| {
+        let profile = &side.skeletons[skeleton].profile;
+        let depth = (overlap / profile.thickness).min(1.0);
+        side.slope(skeleton) * (1.0 + (profile.stiffening - 1.0).max(0.0) * depth)
+    };
+    let (ga, gb) = (slope(&pair.a, i), slope(&pair.b, j));
+    let series = 1.0 / (1.0 / ga + 1.0 / gb);
+    let round = |shape: &Shape| matches!(shape, Shape::Point(_));
+    let lever2 = if round(&a.shape) || round(&b.shape) { 0.0 } else { 0.25 * area };
+    Reachable { stiffness: series * area, lever2 }
+}

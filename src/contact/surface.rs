@@ -1,0 +1,245 @@
+//! The contact surface of a pair: finds its patches and has each integrated by the cheapest scheme that meets the
+//! tolerance.
+
+use super::Scheme;
+use super::closed_form::{self, Round};
+use super::column::Frame;
+use super::deepest::{self, Approach, Deepest};
+use super::overload::is_overloaded;
+use super::pair::{Pair, Side};
+use super::patch::{self, Node, Patch};
+use super::{adaptive, polar, seeds};
+use crate::field::Shape;
+use crate::math::Vec3;
+
+/// What is asked of the integration.
+#[derive(Clone, Copy, Debug)]
+pub struct Settings {
+    /// A scheme to take, or the choice by tolerance.
+    pub scheme: Scheme,
+    /// Relative error accepted in the force.
+    pub tolerance: f64,
+}
+
+/// The patches of a pair and their nodes. Kept between uses for its memory.
+#[derive(Debug, Default)]
+pub struct Surface {
+    /// The patches, the deepest first.
+    pub patches: Vec<Patch>,
+    /// The nodes of all patches.
+    pub nodes: Vec<Node>,
+    /// Skeletons pressed together past the most that they can carry, with where they come closest.
+    pub overloads: Vec<(usize, usize, Approach)>,
+    /// Evaluations of the two fields, fruitless ones included.
+    pub evaluations: u32,
+    maxima: Vec<Deepest>,
+    covered: Vec<Covered>,
+    workspace: adaptive::Workspace,
+}
+
+/// A region of the surface that a patch already accounts for.
+#[derive(Debug)]
+enum Covered {
+    /// Within the border found at equally spaced azimuths.
+    Polar(Frame, Vec<f64>),
+    /// Within these cells of the first grid, in order.
+    Cells(Frame, Vec<(i32, i32)>),
+}
+
+impl Covered {
+    /// Whether a point of the surface lies within the region.
+    fn contains(&self, p: &Vec3) -> bool {
+        let (Covered::Polar(frame, _) | Covered::Cells(frame, _)) = self;
+        let (x, y, height) = frame.coordinates(p);
+        let size = frame.scale[0].max(frame.scale[1]);
+        match self {
+            Covered::Polar(_, border) => {
+                let count = border.len() as f64;
+                let turn = libm::atan2(y, x) / (2.0 * std::f64::consts::PI) * count - 0.5;
+                let below = turn.floor();
+                let at = |i: f64| border[i.rem_euclid(count) as usize];
+                let limit = at(below) + (turn - below) * (at(below + 1.0) - at(below));
+                x.hypot(y) < 1.02 * limit && height.abs() < size * limit
+            }
+            Covered::Cells(_, cells) => {
+                let reach = cells.iter().map(|(i, j)| i.abs().max(j.abs())).max().unwrap_or(0);
+                cells.binary_search(&adaptive::grid_cell(x, y)).is_ok() && height.abs() < size * f64::from(reach + 1)
+            }
+        }
+    }
+}
+
+/// Finds and integrates the contact surface of a pair.
+pub fn integrate(pair: &Pair, settings: &Settings, out: &mut Surface) {
+    out.patches.clear();
+    out.nodes.clear();
+    out.overloads.clear();
+    out.maxima.clear();
+    out.covered.clear();
+    out.evaluations = 0;
+    for i in 0..pair.a.skeletons.len() {
+        for j in 0..pair.b.skeletons.len() {
+            let approach = deepest::approach(pair, i, j);
+            if approach.distance >= pair.a.reach[i] + pair.b.reach[j] {
+                continue;
+            }
+            if is_overloaded(pair, i, j, &approach) {
+                out.overloads.push((i, j, approach));
+            }
+            let closed = matches!(settings.scheme, Scheme::Auto | Scheme::ClosedForm);
+            if closed && closed_patch(pair, &approach, out) {
+                return;
+            }
+            if let Some(found) = deepest::find(pair, i, j, &approach) {
+                out.evaluations += found.evaluations;
+                out.maxima.push(found);
+            }
+        }
+    }
+    // The deepest first; equal ones stay in the order of the skeletons.
+    out.maxima.sort_by(|x, y| y.sum.total_cmp(&x.sum));
+    if settings.scheme == Scheme::Seeds {
+        seeds::integrate(pair, out);
+        return;
+    }
+    let extent = extent(&pair.a).min(extent(&pair.b));
+    for index in 0..out.maxima.len() {
+        let at = out.maxima[index];
+        if out.covered.iter().any(|region| region.contains(&at.position)) {
+            continue;
+        }
+        if !patch(pair, settings, &at, extent, out) {
+            // The surface wraps round: no plane sees all of it, the seeds do.
+            out.patches.clear();
+            out.nodes.clear();
+            seeds::integrate(pair, out);
+            return;
+        }
+    }
+}
+
+impl Surface {
+    /// The maxima found by the last integration, the deepest first.
+    pub fn maxima(&self) -> &[Deepest] {
+        &self.maxima
+    }
+
+    /// What each patch comes to.
+    pub fn sums(&self) -> impl Iterator<Item = patch::Sums> + '_ {
+        self.patches.iter().map(|patch| patch::sum(&self.nodes[patch.nodes.0..patch.nodes.1]))
+    }
+
+    /// Adds a patch whose nodes start at `first`.
+    pub fn push(&mut self, at: &Deepest, first: usize, scale: f64, error: f64, evaluations: u32, scheme: Scheme) {
+        let overloaded = self.overloads.iter().any(|(i, j, _)| [*i, *j] == at.skeletons);
+        self.patches.push(Patch {
+            skeletons: at.skeletons,
+            deepest: at.position,
+            normal: at.normal,
+            peak_pressure: scale * at.sum,
+            nodes: (first, self.nodes.len()),
+            error_estimate: error,
+            evaluations: evaluations + at.evaluations,
+            scheme,
+            overloaded,
+        });
+        self.evaluations += evaluations;
+    }
+}
+
+/// Integrates the patch round a maximum. False when its surface leans over and no height can describe it.
+fn patch(pair: &Pair, settings: &Settings, at: &Deepest, extent: f64, out: &mut Surface) -> bool {
+    let first = out.nodes.len();
+    let mut spent = 0;
+    if settings.scheme != Scheme::Adaptive {
+        let forced = settings.scheme == Scheme::Polar;
+        match polar::integrate(pair, at, extent, settings.tolerance, forced, &mut out.nodes) {
+            Ok(done) => {
+                out.push(at, first, pair.scale, done.error, done.evaluations, Scheme::Polar);
+                out.covered.push(Covered::Polar(done.frame, done.border));
+                return true;
+            }
+            Err(polar::NotStarShaped { evaluations }) => spent = evaluations,
+        }
+    }
+    match adaptive::integrate(pair, at, extent, settings.tolerance, &mut out.workspace, &mut out.nodes) {
+        Ok(done) => {
+            out.push(at, first, pair.scale, done.error, done.evaluations + spent, Scheme::Adaptive);
+            out.covered.push(Covered::Cells(done.frame, done.cells));
+            true
+        }
+        Err(adaptive::LeansOver { evaluations }) => {
+            out.evaluations += evaluations + spent;
+            false
+        }
+    }
+}
+
+/// Size of a coat's finite skeletons, grown by their reach \[m\].
+fn extent(side: &Side) -> f64 {
+    let mut bounds: Option<(Vec3, Vec3)> = None;
+    for (skeleton, reach) in side.skeletons.iter().zip(&side.reach) {
+        if matches!(skeleton.shape, Shape::Plane { .. }) {
+            return f64::INFINITY;
+        }
+        let (low, high) = skeleton.shape.bounds(*reach);
+        bounds = Some(bounds.map_or((low, high), |(l, h)| (l.inf(&low), h.sup(&high))));
+    }
+    bounds.map_or(0.0, |(low, high)| 0.5 * (high - low).norm())
+}
+
+/// A side as a round coat, when it is one.
+fn round(side: &Side) -> Option<(Round, Vec3)> {
+    let [only] = side.skeletons.as_slice() else { return None };
+    if only.profile.stiffening != 1.0 && !side.rigid {
+        return None;
+    }
+    let compliance = 1.0 / side.slope(0);
+    let thickness = only.profile.thickness;
+    match only.shape {
+        Shape::Point(center) => Some((Round { thickness, compliance, plane: false }, center)),
+        Shape::Plane { .. } => Some((Round { thickness, compliance, plane: true }, Vec3::zeros())),
+        _ => None,
+    }
+}
+
+/// Integrates the pair in closed form. False when there is none for it.
+fn closed_patch(pair: &Pair, approach: &Approach, out: &mut Surface) -> bool {
+    let (Some((a, center_a)), Some((b, center_b))) = (round(&pair.a), round(&pair.b)) else { return false };
+    if a.plane && b.plane {
+        return false;
+    }
+    // From the ball, or from a of two balls.
+    let (first, second, center, direction) =
+        if a.plane { (b, a, center_b, -approach.direction) } else { (a, b, center_a, approach.direction) };
+    // Past the overload, and under the profiles' caps, the formula no longer holds.
+    let peak = (a.thickness + b.thickness - approach.distance) / (a.compliance + b.compliance);
+    let inside_cap = |side: &Side, round: &Round| {
+        !round.plane && round.thickness - peak * round.compliance <= side.skeletons[0].profile.cap
+    };
+    let swallowed = !second.plane && approach.distance <= (a.thickness - b.thickness).abs();
+    if inside_cap(&pair.a, &a) || inside_cap(&pair.b, &b) || swallowed {
+        return false;
+    }
+    let Some(axial) = closed_form::contact(&first, &second, approach.distance) else { return true };
+    let normal = approach.direction;
+    let first_node = out.nodes.len();
+    out.nodes.push(Node {
+        position: center + direction * axial.center,
+        force: normal * axial.force,
+        area: axial.area,
+        stiffness: axial.stiffness,
+    });
+    let at = Deepest {
+        position: approach.meeting,
+        normal,
+        axes: [Vec3::zeros(); 2],
+        curvature: [0.0; 2],
+        sum: axial.peak_pressure / pair.scale,
+        slope: 0.0,
+        skeletons: [0, 0],
+        evaluations: 0,
+    };
+    out.push(&at, first_node, pair.scale, 1e-14, 0, Scheme::ClosedForm);
+    true
+}

@@ -1,0 +1,150 @@
+//! One sub-step: drift, evaluate the contact surfaces, kick, drift. Symplectic, of second order, with one evaluation.
+
+use crate::base::Motion;
+use crate::contact::candidate::Candidate;
+use crate::contact::friction;
+use crate::contact::pair::Pair;
+use crate::contact::press::{Carriers, Grip, friction_radius, press};
+use crate::contact::surface::{Settings, integrate};
+use crate::contact::{deepest::Approach, patch};
+use crate::math::{Vec3, Wrench};
+
+/// Speed at which the push-out moves bodies apart, in thicknesses of the thinner coat a second.
+pub const PUSH_OUT: f64 = 2.0;
+
+/// Bodies that are stepped together.
+#[derive(Clone, Debug, Default)]
+pub struct Island {
+    /// Slots of the links that move, each once.
+    pub links: Vec<u32>,
+    /// Positions in the list of candidates.
+    pub candidates: Vec<u32>,
+}
+
+/// Working memory of a sub-step.
+#[derive(Debug, Default)]
+pub struct Work {
+    grips: Vec<Grip>,
+    carriers: Carriers,
+    forces: Vec<Vec3>,
+    /// Evaluations of two fields since it was last cleared.
+    pub evaluations: u64,
+}
+
+/// Advances an island by `h`, with the part `before` of the drift before the kick: a half for the symplectic second
+/// order, none for the force at the pose of the beginning.
+pub fn advance(
+    motions: &mut [Motion],
+    island: &Island,
+    candidates: &mut [Candidate],
+    h: f64,
+    before: f64,
+    settings: &Settings,
+    work: &mut Work,
+) {
+    drift(motions, island, before * h);
+    for index in &island.candidates {
+        let candidate = &mut candidates[*index as usize];
+        candidate.pair.place(motions, candidate.lead);
+        integrate(&candidate.pair, settings, &mut candidate.surface);
+        work.evaluations += u64::from(candidate.surface.evaluations);
+        if candidate.material.static_friction > 0.0 {
+            bend_bristles(candidate, motions, h, &mut work.carriers);
+        }
+    }
+    for link in &island.links {
+        motions[*link as usize].kick(h);
+    }
+    work.grips.clear();
+    for index in &island.candidates {
+        press_candidate(&mut candidates[*index as usize], *index as usize, motions, h, work);
+    }
+    rub(candidates, motions, h, work);
+    drift(motions, island, (1.0 - before) * h);
+}
+
+fn drift(motions: &mut [Motion], island: &Island, h: f64) {
+    if h > 0.0 {
+        for link in &island.links {
+            motions[*link as usize].drift(h);
+        }
+    }
+}
+
+/// The slots of the skeletons that name a patch.
+fn key(pair: &Pair, patch: &patch::Patch) -> [u32; 2] {
+    [pair.a.ids[patch.skeletons[0]], pair.b.ids[patch.skeletons[1]]]
+}
+
+fn bend_bristles(candidate: &mut Candidate, motions: &[Motion], h: f64, carriers: &mut Carriers) {
+    let Candidate { pair, surface, memory, .. } = candidate;
+    for bristle in &mut memory.bristles {
+        bristle.seen = false;
+    }
+    for patch in &surface.patches {
+        let sums = patch::sum(&surface.nodes[patch.nodes.0..patch.nodes.1]);
+        let size = sums.force.norm();
+        if size > 0.0 {
+            let normal = sums.force / size;
+            carriers.find(pair, &sums.center);
+            let place = friction::Place { key: key(pair, patch), position: sums.center, normal };
+            friction::bend(&mut memory.bristles, &place, carriers, motions, &pair.origin, h);
+        }
+    }
+    memory.bristles.retain(|bristle| bristle.seen);
+}
+
+fn press_candidate(candidate: &mut Candidate, index: usize, motions: &mut [Motion], h: f64, work: &mut Work) {
+    let Candidate { pair, surface, material, memory, loads, .. } = candidate;
+    loads.clear();
+    for patch in &surface.patches {
+        let nodes = &surface.nodes[patch.nodes.0..patch.nodes.1];
+        let pressed = press(pair, nodes, material, h, motions, &mut work.carriers, &mut work.forces);
+        let Some(sums) = pressed else {
+            loads.push(patch::Sums::default());
+            continue;
+        };
+        loads.push(sums);
+        memory.touched = true;
+        let load = sums.force.norm();
+        if load > 0.0 && (material.friction > 0.0 || material.static_friction > 0.0) {
+            work.grips.push(Grip {
+                candidate: index,
+                key: key(pair, patch),
+                position: sums.center,
+                normal: sums.force / load,
+                load,
+                radius: friction_radius(nodes, &sums),
+            });
+        }
+    }
+    for (i, j, approach) in &surface.overloads {
+        memory.overloaded = true;
+        memory.touched = true;
+        let thickness = pair.a.skeletons[*i].profile.thickness.min(pair.b.skeletons[*j].profile.thickness);
+        push_out(pair, approach, PUSH_OUT * thickness, motions, &mut work.carriers);
+    }
+}
+
+/// Stops two bodies that press on past the most that their coats can carry, and moves them apart: an inelastic
+/// impulse along the line on which their skeletons come closest.
+fn push_out(pair: &Pair, approach: &Approach, speed: f64, motions: &mut [Motion], carriers: &mut Carriers) {
+    carriers.find(pair, &approach.meeting);
+    let direction = &approach.direction;
+    let parting = carriers.slip(motions, &pair.origin, &approach.meeting).dot(direction);
+    let mobility = carriers.mobility(motions, &pair.origin, &approach.meeting);
+    let along = direction.dot(&(mobility * direction));
+    if parting < speed && along > 0.0 {
+        let impulse = Wrench { force: direction * ((speed - parting) / along), torque: Vec3::zeros() };
+        carriers.push(motions, &pair.origin, &approach.meeting, &impulse);
+    }
+}
+
+fn rub(candidates: &mut [Candidate], motions: &mut [Motion], h: f64, work: &mut Work) {
+    for grip in &work.grips {
+        let Candidate { pair, material, memory, .. } = &mut candidates[grip.candidate];
+        work.carriers.find(pair, &grip.position);
+        let bristle = memory.bristles.iter_mut().find(|bristle| bristle.key == grip.key);
+        friction::rub(grip, material, bristle, h, &work.carriers, motions, &pair.origin);
+    }
+}

@@ -1,0 +1,119 @@
+//! Sub-stepped response: as many small steps as the stiffest contact within reach asks for.
+//!
+//! The rate of a contact is `w² = k W`, with `k` the largest stiffness that it can reach in the step and `W` the
+//! mobility of its two bodies there; the rates of all contacts of a link add up. Sub-steps keep `w h` below the world's
+//! `substep_phase`, do not move a body by more than a part of its coat, and never get coarser while a contact lasts.
+
+use super::substep::{Island, Work, advance};
+use crate::base::Motion;
+use crate::contact::candidate::Candidate;
+use crate::contact::deepest::{self, Approach};
+use crate::contact::pair::Pair;
+use crate::contact::stiffness::reachable;
+use crate::contact::surface::Settings;
+use crate::math::Vec3;
+
+/// Most of the thinner coat that two bodies may approach in one sub-step.
+const TRAVEL: f64 = 0.25;
+
+/// Bounds on the number of sub-steps.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits {
+    /// Largest product of contact frequency and sub-step \[rad\].
+    pub phase: f64,
+    /// Most sub-steps in a step.
+    pub most: u32,
+}
+
+/// What a step of an island took.
+#[derive(Clone, Copy, Debug)]
+pub struct Taken {
+    /// Sub-steps taken.
+    pub substeps: u32,
+    /// Sub-steps that the limits on phase and travel asked for.
+    pub wanted: f64,
+}
+
+/// Advances an island by `dt`. `rates` has a place for each link, all zero, and is left so.
+#[expect(clippy::too_many_arguments, reason = "an island's step touches the whole state")]
+pub fn step(
+    motions: &mut [Motion],
+    island: &Island,
+    candidates: &mut [Candidate],
+    dt: f64,
+    settings: &Settings,
+    limits: &Limits,
+    rates: &mut [f64],
+    work: &mut Work,
+) -> Taken {
+    let mut travel = 0.0f64;
+    for index in &island.candidates {
+        let candidate = &mut candidates[*index as usize];
+        candidate.pair.place(motions, candidate.lead);
+        let (rate2, crossed) = demand(&candidate.pair, motions, dt);
+        candidate.memory.rate2 = if candidate.memory.touching { rate2.max(candidate.memory.rate2) } else { rate2 };
+        travel = travel.max(crossed);
+        for link in links(&candidate.pair) {
+            if motions[link as usize].is_movable() {
+                rates[link as usize] += candidate.memory.rate2;
+            }
+        }
+    }
+    let mut rate2 = 0.0f64;
+    for link in &island.links {
+        rate2 = rate2.max(std::mem::take(&mut rates[*link as usize]));
+    }
+    let wanted = (rate2.sqrt() * dt / limits.phase).max(travel / TRAVEL).ceil().max(1.0);
+    let substeps = wanted.min(f64::from(limits.most)) as u32;
+    let h = dt / f64::from(substeps);
+    for _ in 0..substeps {
+        advance(motions, island, candidates, h, 0.5, settings, work);
+    }
+    Taken { substeps, wanted }
+}
+
+/// The links of a pair, each once.
+fn links(pair: &Pair) -> impl Iterator<Item = u32> + '_ {
+    let both = || pair.a.links.iter().chain(&pair.b.links);
+    both()
+        .enumerate()
+        .filter(move |(index, link)| both().take(*index).all(|other| other != *link))
+        .map(|(_, link)| *link)
+}
+
+/// Square of the largest rate that a pair can reach in a step, and how many times the thinner coat its skeletons may
+/// approach each other.
+fn demand(pair: &Pair, motions: &[Motion], dt: f64) -> (f64, f64) {
+    let (mut rate2, mut crossed) = (0.0, 0.0f64);
+    for i in 0..pair.a.skeletons.len() {
+        for j in 0..pair.b.skeletons.len() {
+            let approach = deepest::approach(pair, i, j);
+            let closing = closing(pair, i, j, &approach, motions, dt);
+            let overlap = pair.a.reach[i] + pair.b.reach[j] - approach.distance + closing;
+            if overlap <= 0.0 {
+                continue;
+            }
+            let thickness = pair.a.skeletons[i].profile.thickness.min(pair.b.skeletons[j].profile.thickness);
+            crossed = crossed.max(closing / thickness);
+            let bound = reachable(pair, i, j, overlap);
+            let mobility = |link: u32| {
+                let motion = &motions[link as usize];
+                let arm = approach.meeting - (motion.center - pair.origin);
+                let lever2 = arm.cross(&approach.direction).norm_squared() + bound.lever2;
+                motion.inverse_mass() + lever2 * motion.inverse_moment()
+            };
+            rate2 += bound.stiffness * (mobility(pair.a.links[i]) + mobility(pair.b.links[j]));
+        }
+    }
+    (rate2, crossed)
+}
+
+/// By how much two skeletons can come closer in a step.
+fn closing(pair: &Pair, i: usize, j: usize, approach: &Approach, motions: &[Motion], dt: f64) -> f64 {
+    let (a, b) = (&motions[pair.a.links[i] as usize], &motions[pair.b.links[j] as usize]);
+    let velocity = |motion: &Motion| motion.twist.at(&(approach.meeting - (motion.center - pair.origin)));
+    let acceleration = |motion: &Motion| if motion.is_movable() { motion.acceleration } else { Vec3::zeros() };
+    let speed = (velocity(a) - velocity(b)).dot(&approach.direction);
+    let gain = (acceleration(a) - acceleration(b)).dot(&approach.direction).max(0.0);
+    (speed * dt + 0.5 * gain * dt * dt).max(0.0)
+}

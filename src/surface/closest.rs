@@ -1,0 +1,181 @@
+//! The point of a coat's surface that is closest to a given point.
+//!
+//! Where only one field reaches, the answer is a closed form. Where several blend, every skeleton in reach (and, from
+//! the inside, a fan of directions) gives a start on the surface, from which Newton's method on the distance along the
+//! surface goes down to a local minimum; the lowest one wins.
+
+use super::SurfaceHit;
+use super::ray::cast;
+use crate::coat::Coat;
+use crate::coat::root::bracketed;
+use crate::field::{Placed, Shape, blend};
+use crate::math::{Vec3, tangents};
+
+/// The closest point of the coat's surface, from outside or inside, in the frame of the coat; `None` if there is no
+/// surface.
+///
+/// The sign of the distance is that of the solid: negative where the field is at least the isovalue. The position is
+/// exact to rounding where a single field reaches and a root of the stationarity condition `(x - p) ∥ ∇f` elsewhere. A
+/// blend has no closed form: the search could miss the closest of several dents that no skeleton points at.
+pub fn closest(coat: &Coat, p: &Vec3) -> Option<SurfaceHit> {
+    let depth = |skeleton: &Placed| skeleton.shape.closest(p).distance - skeleton.profile.thickness;
+    let depths: Vec<f64> = coat.skeletons.iter().map(depth).collect();
+    let nearest = (0..depths.len()).min_by(|a, b| depths[*a].total_cmp(&depths[*b]))?;
+    let inside = coat.excess(p) >= 0.0;
+    // The isolated surface of the nearest skeleton lies in the solid, or on its surface: none is further away outside.
+    let alone = on_isolated(&coat.skeletons[nearest], p);
+    let mut near = subset(coat, p, depths[nearest].abs());
+    let position = if near.skeletons.len() <= 1 {
+        alone
+    } else if inside {
+        let exits: Vec<Vec3> = directions(&near, p).filter_map(|u| exit(coat, p, &u)).collect();
+        let distance = exits.iter().map(|x| (x - p).norm()).fold(f64::INFINITY, f64::min);
+        if distance == f64::INFINITY {
+            return None;
+        }
+        // Room for starts that slide closer than the best of them.
+        near = subset(coat, p, 2.0 * distance);
+        let starts = exits.into_iter().filter(|x| (x - p).norm() <= 2.0 * distance);
+        let found = lowest(&near, p, starts)?;
+        let toward_others = directions(&near, p).filter_map(|u| exit(&near, p, &u));
+        lowest(&near, p, toward_others.filter(|x| (x - p).norm() <= 2.0 * distance).chain([found]))?
+    } else {
+        let limit = (alone - p).norm();
+        let first = near.skeletons.iter().map(|skeleton| on_isolated(skeleton, p));
+        let between = near.skeletons.iter().map(|skeleton| (on_isolated(skeleton, p) + alone) * 0.5);
+        let targets: Vec<Vec3> = first.chain(between).collect();
+        let starts = targets.iter().filter_map(|x| {
+            let direction = (x - p).try_normalize(0.0)?;
+            Some(cast(&near, p, &direction, limit * (1.0 + 1e-9))?.position)
+        });
+        lowest(&near, p, starts).unwrap_or(alone)
+    };
+    let offset = position - p;
+    // On the surface itself the offset has no direction, and its length is the distance.
+    let distance = if inside { -offset.norm() } else { offset.norm() };
+    let normal = coat.normal(&position, &coat.skeletons[nearest].shape.closest(&position).normal);
+    Some(SurfaceHit { distance, position, normal, skeleton: blend::territory(&coat.skeletons, &position) })
+}
+
+/// The skeletons whose field reaches the ball of this radius round `p`.
+fn subset(coat: &Coat, p: &Vec3, radius: f64) -> Coat {
+    let limit = radius * (1.0 + 1e-9);
+    let reaches = |k: &&Placed| k.shape.closest(p).distance - k.profile.radius < limit;
+    Coat {
+        skeletons: coat.skeletons.iter().filter(reaches).copied().collect(),
+        ..Coat::new(coat.origin, coat.isovalue)
+    }
+}
+
+/// The closest point of the surface of an isolated skeleton.
+fn on_isolated(skeleton: &Placed, p: &Vec3) -> Vec3 {
+    let (shape, thickness) = (&skeleton.shape, skeleton.profile.thickness);
+    let closest = shape.closest(p);
+    let thin = !shape.is_solid();
+    // On a thin skeleton the direction to it is lost to rounding: any direction square to it is as good.
+    if thin && closest.distance <= 1e-10 * thickness + 8.0 * f64::EPSILON * p.norm() {
+        let across = across(shape);
+        let side = if across.dot(&closest.normal) < 0.0 { -1.0 } else { 1.0 };
+        return shape.closest_point(p) + across * (side * thickness);
+    }
+    let foot = if closest.distance > 0.0 { shape.closest_point(p) } else { p - closest.normal * closest.distance };
+    let position = foot + closest.normal * thickness;
+    // Near a thin skeleton the direction has few digits: one more step puts the point on the surface to the last one.
+    let again = shape.closest(&position);
+    position + again.normal * (thickness - again.distance)
+}
+
+/// A unit vector square to a thin shape.
+fn across(shape: &Shape) -> Vec3 {
+    match shape {
+        Shape::Segment(a, b) => tangents(&(b - a).normalize()).0,
+        Shape::Triangle(a, b, c) => (b - a).cross(&(c - a)).normalize(),
+        _ => Vec3::x(),
+    }
+}
+
+/// Directions in which to look for the surface from inside: away from each skeleton, down the field, and a fixed fan
+/// of axes and diagonals.
+fn directions(coat: &Coat, p: &Vec3) -> impl Iterator<Item = Vec3> {
+    let away = coat.skeletons.iter().map(|k| k.shape.closest(p).normal);
+    let downhill = -coat.excess_gradient(p).1;
+    let fan = (0..27).map(|i| Vec3::new(f64::from(i % 3 - 1), f64::from(i / 3 % 3 - 1), f64::from(i / 9 - 1)));
+    let all: Vec<Vec3> = away.chain([downhill]).chain(fan).collect();
+    all.into_iter().filter_map(|u| u.try_normalize(0.0))
+}
+
+/// Where a ray from the inside leaves the solid; `None` if it does not.
+fn exit(coat: &Coat, p: &Vec3, direction: &Vec3) -> Option<Vec3> {
+    let mut stride = coat.skeletons.iter().map(|k| 0.25 * k.profile.thickness).fold(f64::INFINITY, f64::min);
+    let excess = |s: f64| coat.excess(&(p + direction * s));
+    let (mut s, mut here) = (0.0, excess(0.0));
+    for _ in 0..100 {
+        let ahead = excess(s + stride);
+        if ahead < 0.0 {
+            return Some(p + direction * bracketed(s, s + stride, here, ahead, excess));
+        }
+        (s, here) = (s + stride, ahead);
+        stride *= 1.25;
+    }
+    None
+}
+
+/// The closest to `p` of the local minima that the starts lead to.
+fn lowest(coat: &Coat, p: &Vec3, starts: impl Iterator<Item = Vec3>) -> Option<Vec3> {
+    let ends = starts.map(|x| descend(coat, p, x));
+    ends.min_by(|a, b| (a - p).norm_squared().total_cmp(&(b - p).norm_squared()))
+}
+
+/// Slides from `x`, on the surface, to a local minimum of the distance to `p`: Newton's steps in the tangent plane,
+/// each brought back to the surface and shortened until it gains.
+fn descend(coat: &Coat, p: &Vec3, mut x: Vec3) -> Vec3 {
+    for _ in 0..60 {
+        let (_, gradient, hessian) = blend::value_gradient_hessian(&coat.skeletons, &x);
+        let slope = gradient.norm();
+        if slope == 0.0 {
+            break;
+        }
+        let normal = -gradient / slope;
+        let (offset, (e1, e2)) = (p - x, tangents(&normal));
+        let along = offset.dot(&normal);
+        let pull = (offset.dot(&e1), offset.dot(&e2));
+        if pull.0.hypot(pull.1) <= 1e-15 * offset.norm() {
+            break;
+        }
+        // Hessian of the Lagrangian |x - p|²/2 + λ (f - c) in the tangent plane, with λ = -along / slope.
+        let bend = |a: &Vec3, b: &Vec3| -(along / slope) * a.dot(&(hessian * b));
+        let (h11, h12, h22) = (1.0 + bend(&e1, &e1), bend(&e1, &e2), 1.0 + bend(&e2, &e2));
+        let determinant = h11 * h22 - h12 * h12;
+        let (z1, z2) = if h11 > 0.0 && determinant > 1e-6 * h11.max(h22).powi(2) {
+            ((h22 * pull.0 - h12 * pull.1) / determinant, (h11 * pull.1 - h12 * pull.0) / determinant)
+        } else {
+            pull
+        };
+        let step = e1 * z1 + e2 * z2;
+        let shorter = |k: i32| onto_surface(coat, x + step * 0.5_f64.powi(k));
+        let better = |y: &Vec3| (y - p).norm_squared() < offset.norm_squared();
+        match (0..24).filter_map(shorter).find(better) {
+            Some(next) => x = next,
+            None => break,
+        }
+    }
+    x
+}
+
+/// Newton's steps along the gradient to the surface; `None` if they do not get there.
+fn onto_surface(coat: &Coat, mut x: Vec3) -> Option<Vec3> {
+    let mut best = f64::INFINITY;
+    for _ in 0..20 {
+        let (excess, gradient) = coat.excess_gradient(&x);
+        let slope2 = gradient.norm_squared();
+        if slope2 == 0.0 || excess.abs() > 2.0 * best {
+            return None;
+        }
+        if excess.abs() <= 2e-16 * coat.isovalue || excess.abs() >= best && best <= 1e-12 * coat.isovalue {
+            return Some(x);
+        }
+        best = excess.abs().min(best);
+        x -= gradient * (excess / slope2);
+    }
+    (best <= 1e-12 * coat.isovalue).then_some(x)
+}

@@ -1,0 +1,19 @@
+//! The surface of a coat as others see it: [`ray`] finds where a ray meets it, [`closest`] where it is nearest.
+
+pub mod closest;
+pub mod ray;
+
+use crate::math::Vec3;
+
+/// A point of a coat's surface, in the frame of the coat.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfaceHit {
+    /// For rays: length of the ray up to here. For closest points: signed distance, negative inside \[m\].
+    pub distance: f64,
+    /// Where \[m\].
+    pub position: Vec3,
+    /// Outward unit normal.
+    pub normal: Vec3,
+    /// Index of the skeleton in whose territory it lies.
+    pub skeleton: usize,
+}

@@ -1,0 +1,168 @@
+//! Gathering: from the nouns of the world to the motions and candidate pairs that the step works on.
+
+use super::{Body, Link, Scheme, Skeleton, World};
+use crate::base::{Inertia, Kind, Motion};
+use crate::contact::broad_phase::Bounds;
+use crate::contact::candidate::Candidate;
+use crate::contact::pair::Side;
+use crate::contact::press::Material;
+use crate::field::{Placed, Shape};
+use crate::math::{Pose, Twist, Vec3};
+
+impl World {
+    /// The motion of a link as the host or the last step left it.
+    pub(super) fn motion_of(&self, link: &Link) -> Motion {
+        let desc = &link.desc;
+        let movable = link.enabled && self.bodies[link.body as usize].enabled;
+        let inertia = match desc.kind {
+            _ if !movable => Inertia::Immovable,
+            Kind::Fixed => Inertia::Immovable,
+            Kind::PointMass => Inertia::Point { inverse_mass: 1.0 / desc.mass },
+            Kind::Host if desc.mass == 0.0 => Inertia::Immovable,
+            Kind::Host | Kind::Rigid => match &desc.inverse_effective_inertia {
+                Some(matrix) if desc.kind == Kind::Host => Inertia::Effective(**matrix),
+                _ => Inertia::solid(desc.mass, desc.inertia, &desc.pose.rotation),
+            },
+        };
+        let mut motion = Motion {
+            center: desc.pose.transform_point(&desc.local_center),
+            rotation: desc.pose.rotation,
+            local_center: desc.local_center,
+            twist: if desc.kind == Kind::Fixed || !movable { Twist::default() } else { desc.twist },
+            inertia,
+            ..Motion::default()
+        };
+        if motion.is_movable() {
+            motion.acceleration = self.desc.gravity * desc.gravity_scale + desc.external_acceleration;
+            motion.angular_acceleration = desc.external_angular_acceleration;
+        }
+        motion
+    }
+
+    /// The enabled skeletons of a body, with the slots of their links and their own.
+    pub(super) fn skeletons_of<'a>(&'a self, body: &'a Body) -> impl Iterator<Item = (u32, u32, &'a Skeleton)> + 'a {
+        let enabled_links = body.links.iter().filter(|link| self.links[**link as usize].enabled);
+        enabled_links.flat_map(move |link| {
+            self.links[*link as usize].skeletons.iter().filter_map(move |index| {
+                let skeleton = &self.skeletons[*index as usize];
+                skeleton.enabled.then_some((*link, *index, skeleton))
+            })
+        })
+    }
+
+    /// Bounds of a body over a step of `dt`. `None` when it has no coat.
+    pub(super) fn bounds_of(&self, index: usize, motions: &[Motion], dt: f64) -> Option<Bounds> {
+        let mut bounds: Option<(Vec3, Vec3)> = None;
+        for (link, _, skeleton) in self.skeletons_of(&self.bodies[index]) {
+            let motion = &motions[link as usize];
+            let pose = motion.pose();
+            let (mut low, mut high) = skeleton.desc.shape.transformed(&pose).bounds(skeleton.reach);
+            // Translation goes one way; turning and acceleration may go any.
+            let path = motion.twist.linear * dt;
+            let size = (high - low).norm() + (pose.position - motion.center).norm();
+            let any = 0.5 * motion.acceleration.norm() * dt * dt
+                + (motion.twist.angular.norm() * dt).min(2.0) * if size.is_finite() { size } else { 0.0 };
+            low += path.inf(&Vec3::zeros()) - Vec3::repeat(any);
+            high += path.sup(&Vec3::zeros()) + Vec3::repeat(any);
+            bounds = Some(bounds.map_or((low, high), |(l, h)| (l.inf(&low), h.sup(&high))));
+        }
+        bounds.map(|(low, high)| Bounds { low, high, body: index as u32 })
+    }
+
+    /// Fills a candidate with what of its bodies can matter within both their bounds. False when nothing can.
+    pub(super) fn fill(
+        &self,
+        candidate: &mut Candidate,
+        motions: &[Motion],
+        bounds: [&Bounds; 2],
+        scheme: Scheme,
+    ) -> bool {
+        let [a, b] = candidate.bodies.map(|body| &self.bodies[body as usize]);
+        if a.desc.rigid && b.desc.rigid {
+            return false;
+        }
+        // The automatic choice may have to fall back on seeds.
+        let seeds = matches!(scheme, Scheme::Auto | Scheme::Adaptive | Scheme::Polar | Scheme::Seeds);
+        let region = (bounds[0].low.sup(&bounds[1].low), bounds[0].high.inf(&bounds[1].high));
+        self.fill_side(&mut candidate.pair.a, a, motions, &region, seeds);
+        self.fill_side(&mut candidate.pair.b, b, motions, &region, seeds);
+        if candidate.pair.a.locals.is_empty() || candidate.pair.b.locals.is_empty() {
+            return false;
+        }
+        candidate.pair.prepare();
+        candidate.material = material(a, b);
+        // The smaller body's link leads: its coordinates near the contact are the smallest.
+        let size = |bounds: &Bounds| (bounds.high - bounds.low).norm();
+        let smaller = if size(bounds[0]) <= size(bounds[1]) { &candidate.pair.a } else { &candidate.pair.b };
+        candidate.lead = smaller.links[0];
+        true
+    }
+
+    fn fill_side(&self, side: &mut Side, body: &Body, motions: &[Motion], region: &(Vec3, Vec3), seeds: bool) {
+        side.clear();
+        side.isovalue = body.desc.isovalue;
+        side.stiffness_scale = body.desc.stiffness_scale;
+        side.rigid = body.desc.rigid;
+        for (link, index, skeleton) in self.skeletons_of(body) {
+            let shape = skeleton.desc.shape;
+            let pose = motions[link as usize].pose();
+            let (low, high) = shape.transformed(&pose).bounds(skeleton.profile.radius);
+            if (0..3).any(|axis| low[axis] > region.1[axis] || region.0[axis] > high[axis]) {
+                continue;
+            }
+            side.skeletons.push(Placed { shape, profile: skeleton.profile });
+            side.locals.push(shape);
+            side.poses.push(Pose::default());
+            side.links.push(link);
+            side.ids.push(index);
+            side.reach.push(skeleton.reach);
+            if seeds {
+                side.rays.push(skeleton.rays(self.desc.seed_count));
+            }
+        }
+    }
+
+    /// The thinnest coat of a link's skeletons.
+    pub(super) fn thinnest(&self, link: &Link) -> f64 {
+        let thickness = |index: &u32| self.skeletons[*index as usize].profile.thickness;
+        link.skeletons.iter().map(thickness).fold(f64::INFINITY, f64::min)
+    }
+}
+
+impl Skeleton {
+    /// The skeleton's rays in its link's frame, made at the first use. None for a plane: its lattice depends on what
+    /// lies on it.
+    pub(super) fn rays(&self, default_count: u32) -> std::sync::Arc<[crate::coat::seeds::Ray]> {
+        let count = if self.desc.seed_count == 0 { default_count } else { self.desc.seed_count };
+        let make = || {
+            let mut rays = Vec::new();
+            if !matches!(self.desc.shape, Shape::Plane { .. }) {
+                crate::coat::seeds::rays(&self.desc.shape, self.profile.thickness, count as usize, &mut rays);
+            }
+            (count, rays.into())
+        };
+        let (made_for, rays) = self.rays.get_or_init(make);
+        if *made_for == count { rays.clone() } else { make().1 }
+    }
+}
+
+/// What two bodies make of their surfaces (the rules are those of [`BodyDesc`](super::BodyDesc)).
+fn material(a: &Body, b: &Body) -> Material {
+    let (a, b) = (&a.desc, &b.desc);
+    let mean = |x: f64, y: f64| (x * y).sqrt();
+    // The softer a body, the more of the flesh that moves is its own: d = (K_b d_a + K_a d_b) / (K_a + K_b).
+    let dissipation = match (a.rigid, b.rigid) {
+        (false, true) => a.dissipation,
+        (true, false) => b.dissipation,
+        _ => {
+            let (ka, kb) = (a.stiffness_scale, b.stiffness_scale);
+            (kb * a.dissipation + ka * b.dissipation) / (ka + kb)
+        }
+    };
+    Material {
+        friction: mean(a.friction, b.friction),
+        static_friction: mean(a.static_friction, b.static_friction),
+        viscous: a.viscous_friction * b.viscous_friction,
+        dissipation,
+    }
+}
