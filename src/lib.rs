@@ -1,14 +1,22 @@
 //! Soft coats for rigid things.
 //!
+//! Each body is a base structure of links with an implicit coat: skeleton primitives emit fields whose isosurface is
+//! the skin. Coats meet in contact surfaces of equal pressure, and their compression gives the forces.
+//!
 //! The layers, each importing only from those above it in this list:
 //!
-//! - [`math`], [`error`]: vectors, poses, one error enum;
-//! - [`field`]: what skeletons emit;
-//! - [`base`]: the links that carry them;
-//! - [`response`]: how forces move links;
-//! - [`world`]: the nouns, the step, the queries.
+//! - [`math`], [`error`], [`handle`]: vectors and poses, one error enum, ids of objects;
+//! - [`field`]: what skeletons emit, and how it adds up;
+//! - [`base`]: the links that carry skeletons;
+//! - [`coat`]: the implicit layer of one body: seeds and territories;
+//! - [`contact`]: where two coats meet, with what pressure, friction and dissipation;
+//! - [`response`]: how the forces move links, and what the host is told;
+//! - [`surface`]: rays and closest points on a coat;
+//! - [`world`]: the nouns, the step, the queries;
+//! - [`capi`]: the same for C.
 
 pub mod base;
+pub mod capi;
 pub mod coat;
 pub mod contact;
 pub mod error;
@@ -16,6 +24,7 @@ pub mod field;
 pub mod handle;
 pub mod math;
 pub mod response;
+pub mod surface;
 pub mod world;
 
 pub use error::{Error, Result};

@@ -16,7 +16,9 @@
  * Units     SI; angles in rad. Frames are right-handed, quaternions x, y, z, w. Vectors are in the world's axes unless
  *           a name says local, and the points of a skeleton are in its link's frame.
  * Status    Every call that can fail returns an isocoat_status. A call that fails has changed nothing and written no
- *           output (but the count that a too small buffer needs). isocoat_last_error tells what was wrong.
+ *           output (but the count that a too small buffer needs). isocoat_last_error tells what was wrong, with the
+ *           value and the range. Not repeated below: INVALID_ARGUMENT for a NULL that is not allowed, LOCKED and
+ *           POISONED for every call on a world.
  * Handles   Small structs by value. All zero is null. A null, stale or foreign handle is an error, never a crash.
  * Structs   Those that begin with struct_size may grow at their end: begin with their _default() and set the rest, so
  *           that hosts and libraries of different versions fit together.
@@ -34,6 +36,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+
 /* Version of this header; isocoat_version() gives that of the library. */
 #define ISOCOAT_VERSION_MAJOR 0
 #define ISOCOAT_VERSION_MINOR 1
@@ -41,7 +44,7 @@
 #define ISOCOAT_VERSION_STRING "0.1.0"
 /* The three in one number, as isocoat_version() gives them. */
 #define ISOCOAT_VERSION \
-    (((uint32_t)ISOCOAT_VERSION_MAJOR << 22) | ((uint32_t)ISOCOAT_VERSION_MINOR << 12) | (uint32_t)ISOCOAT_VERSION_PATCH)
+    ((uint32_t)ISOCOAT_VERSION_MAJOR << 22 | (uint32_t)ISOCOAT_VERSION_MINOR << 12 | (uint32_t)ISOCOAT_VERSION_PATCH)
 
 /* Warns where a status is dropped. */
 #ifndef ISOCOAT_MUST_USE
@@ -54,844 +57,172 @@
 #endif
 #endif
 
-/*
- A world: it owns every body, link and skeleton; one step advances it. Worlds are independent of each other.
- */
-typedef struct isocoat_world isocoat_world;
+#ifdef __cplusplus
+extern "C" {
+#endif
 
-/*
- What a call came to: ISOCOAT_OK, or an ISOCOAT_ERROR_ code. Codes are never renumbered; new ones may come.
- */
+/* ---- Status ------------------------------------------------------------------------------------------------------ */
+
+/** What a call came to: ISOCOAT_OK, or an ISOCOAT_ERROR_ code. Codes are never renumbered; new ones may come. */
 typedef uint32_t isocoat_status;
 
-/*
- How contact forces act on the links in time: an ISOCOAT_RESPONSE_ value.
+/** Done. */
+#define ISOCOAT_OK 0u
+/**
+ * A pointer is NULL that must not be, a struct_size or an enum value is unknown, a count or a stride makes no sense.
  */
-typedef uint32_t isocoat_response;
-
-/*
- How a contact surface is integrated: an ISOCOAT_SCHEME_ value.
+#define ISOCOAT_ERROR_INVALID_ARGUMENT 1u
+/** A handle is null, belongs to another world, or its object was destroyed. */
+#define ISOCOAT_ERROR_INVALID_HANDLE 2u
+/** A number is outside its range, or is not a number. */
+#define ISOCOAT_ERROR_OUT_OF_RANGE 3u
+/** The call makes no sense for this object, or this version of the library cannot do it. */
+#define ISOCOAT_ERROR_UNSUPPORTED 4u
+/** A limit of the library is reached. */
+#define ISOCOAT_ERROR_CAPACITY 5u
+/** The buffer is too small: the call has written the count it needs, and nothing else. */
+#define ISOCOAT_ERROR_BUFFER_TOO_SMALL 6u
+/**
+ * The world is being stepped or changed, or it is being read and the call would change it. Calls from the callbacks
+ * of a step get this code too.
  */
-typedef uint32_t isocoat_scheme;
+#define ISOCOAT_ERROR_LOCKED 7u
+/** An internal error has left the world in an unknown state: it can only be destroyed. */
+#define ISOCOAT_ERROR_POISONED 8u
 
-/*
- Settings of a world. Begin with isocoat_world_desc_default().
+/**
+ * The message of the last call on this thread that did not return ISOCOAT_OK: what was wrong, with the value and the
+ * range. Calls that succeed leave it as it is.
+ *
+ * - buffer: receives the message with a terminating zero, cut to fit; may be NULL when capacity is 0.
+ * - capacity: bytes in buffer.
+ *
+ * Returns the length of the whole message in bytes, without the terminating zero; 0 when no call has failed yet.
+ * Threads: any.
  */
-typedef struct isocoat_world_desc {
-    /*
-     Size of this struct in bytes, as the host knows it.
-     */
-    uint32_t struct_size;
-    /*
-     How contact forces act in time. Default ISOCOAT_RESPONSE_AUTO.
-     */
-    isocoat_response response;
-    /*
-     How contact surfaces are integrated. Default ISOCOAT_SCHEME_AUTO.
-     */
-    isocoat_scheme scheme;
-    /*
-     Seeds of a skeleton that does not say its own number: from 4 to 65536. Default 64.
-     */
-    uint32_t seed_count;
-    /*
-     Upper bound of the sub-steps in one step: from 1 to 65536. Default 4096.
-     */
-    uint32_t max_substeps;
-    /*
-     Acceleration of gravity, in m/s^2, finite. Default 0.
-     */
-    double gravity[3];
-    /*
-     Relative error accepted in a contact force: from 1e-9 to 0.5. Default 5e-3.
-     */
-    double force_tolerance;
-    /*
-     Largest product of contact frequency and sub-step, in rad: from 0.01 to 1. Default 0.2.
-     */
-    double substep_phase;
-} isocoat_world_desc;
+size_t isocoat_last_error(char *buffer, size_t capacity);
 
-/*
- How much a message matters: an ISOCOAT_LOG_ value. More may come.
+/**
+ * The name of a status, such as "ISOCOAT_ERROR_LOCKED"; "unknown status" for a number that is none.
+ *
+ * Lifetime: static. Threads: any.
  */
-typedef uint32_t isocoat_log_level;
+const char *isocoat_status_name(isocoat_status status);
 
-/*
- Receives the messages of a world, on the thread of the call that has something to say.
+/* ---- Version ----------------------------------------------------------------------------------------------------- */
 
- - context: as given to isocoat_world_set_log.
- - level: an ISOCOAT_LOG_ value.
- - message: UTF-8; valid during the call.
-
- It must return (no longjmp, no exception); calls on the world from here give ISOCOAT_ERROR_LOCKED.
+/**
+ * The version of the library that runs, as ISOCOAT_VERSION packs it: major << 22 | minor << 12 | patch.
+ *
+ * Threads: any.
  */
-typedef void (*isocoat_log_fn)(void *context, isocoat_log_level level, const char *message);
+uint32_t isocoat_version(void);
 
-/*
- Handle of a body: one deformable or rigid object. All zero is null. A handle whose body was destroyed, or of
- another world, gives ISOCOAT_ERROR_INVALID_HANDLE; it never becomes valid again.
+/**
+ * The version of the library that runs, such as "0.1.0".
+ *
+ * Lifetime: static. Threads: any.
+ */
+const char *isocoat_version_string(void);
+
+/**
+ * What isocoat_check_abi calls: compares a host's version and struct sizes with the library's.
+ *
+ * - version: ISOCOAT_VERSION of the header that the host was compiled with.
+ * - sizes: sizeof of the structs, in the header's order; not NULL unless count is 0.
+ * - count: number of sizes; a count other than this library's own compares what both know.
+ *
+ * Errors: UNSUPPORTED when they do not fit together; INVALID_ARGUMENT. Threads: any.
+ */
+ISOCOAT_MUST_USE isocoat_status isocoat_check_abi_of(uint32_t version, const uint32_t *sizes, size_t count);
+
+/* ---- Handles ----------------------------------------------------------------------------------------------------- */
+
+/**
+ * Handle of a body: one deformable or rigid object. All zero is null. A handle whose body was destroyed, or of
+ * another world, gives ISOCOAT_ERROR_INVALID_HANDLE; it never becomes valid again.
  */
 typedef struct isocoat_body {
-    /*
-     Slot of the body in its world.
-     */
+    /** Slot of the body in its world. */
     uint32_t index;
-    /*
-     How often the slot was used; 0 only in the null handle.
-     */
+    /** How often the slot was used; 0 only in the null handle. */
     uint16_t generation;
-    /*
-     Tag of the world; 0 only in the null handle.
-     */
+    /** Tag of the world; 0 only in the null handle. */
     uint16_t world;
 } isocoat_body;
 
-/*
- Says whether two bodies may touch; called in a step for each pair whose bounds meet, after categories and masks.
-
- - context: as given to isocoat_world_set_pair_filter.
- - body_a, body_b: the pair.
-
- It must return (no longjmp, no exception), the same answer for the same pair within a step; calls on the world from
- here give ISOCOAT_ERROR_LOCKED.
- */
-typedef bool (*isocoat_pair_filter_fn)(void *context, struct isocoat_body body_a, struct isocoat_body body_b);
-
-/*
- What a body is made of: an ISOCOAT_BODY_ value.
- */
-typedef uint32_t isocoat_body_kind;
-
-/*
- One object: what its coat is made of. Begin with isocoat_body_desc_default().
- */
-typedef struct isocoat_body_desc {
-    /*
-     Size of this struct in bytes, as the host knows it.
-     */
-    uint32_t struct_size;
-    /*
-     What it is made of. Default ISOCOAT_BODY_DEFORMABLE.
-     */
-    isocoat_body_kind kind;
-    /*
-     Field value on the surface, > 1e-9 and at most 1e9. Default 1.
-     */
-    double isovalue;
-    /*
-     Pressure a unit of field, in Pa, > 0 and at most 1e18. Default 1e5.
-     */
-    double stiffness_scale;
-    /*
-     Coefficient of Coulomb friction, at least 0; a pair takes the geometric mean. Default 0.
-     */
-    double friction;
-    /*
-     Coefficient of static friction: 0 (off), or at least friction; a pair takes the geometric mean. Default 0.
-     */
-    double static_friction;
-    /*
-     Viscous friction, in sqrt(N s/m^3), at least 0; a pair takes the product. Default 0.
-     */
-    double viscous_friction;
-    /*
-     Hunt-Crossley dissipation, in s/m, at least 0; a pair takes the mean weighted by the other's softness. Default 0.
-     */
-    double dissipation;
-    /*
-     What this body is, as bits. Default 1.
-     */
-    uint64_t category;
-    /*
-     Which categories it touches, as bits; two bodies touch when each one's mask has a bit of the other's category.
-     Default all.
-     */
-    uint64_t mask;
-    /*
-     The host's own; given back, otherwise unused. Default NULL.
-     */
-    void *user_data;
-} isocoat_body_desc;
-
-/*
- Handle of a link: one moving frame of a body. The rules of isocoat_body hold.
- */
+/** Handle of a link: one moving frame of a body. The rules of isocoat_body hold. */
 typedef struct isocoat_link {
-    /*
-     Slot of the link in its world.
-     */
+    /** Slot of the link in its world. */
     uint32_t index;
-    /*
-     How often the slot was used; 0 only in the null handle.
-     */
+    /** How often the slot was used; 0 only in the null handle. */
     uint16_t generation;
-    /*
-     Tag of the world; 0 only in the null handle.
-     */
+    /** Tag of the world; 0 only in the null handle. */
     uint16_t world;
 } isocoat_link;
 
-/*
- Who moves a link: an ISOCOAT_LINK_ value.
- */
-typedef uint32_t isocoat_link_kind;
+/** Handle of a skeleton: a primitive, fixed in a link's frame, that emits a field. The rules of isocoat_body hold. */
+typedef struct isocoat_skeleton {
+    /** Slot of the skeleton in its world. */
+    uint32_t index;
+    /** How often the slot was used; 0 only in the null handle. */
+    uint16_t generation;
+    /** Tag of the world; 0 only in the null handle. */
+    uint16_t world;
+} isocoat_skeleton;
 
-/*
- Position and orientation of a frame in the world.
- */
+/* ---- Poses, wrenches, inertia ------------------------------------------------------------------------------------ */
+
+/** Position and orientation of a frame in the world. */
 typedef struct isocoat_pose {
-    /*
-     Origin of the frame, in m. Default 0.
-     */
+    /** Origin of the frame, in m. Default 0. */
     double position[3];
-    /*
-     Rotation from the frame to the world: a quaternion x, y, z, w with a norm of 1 within 1e-3; it is normalised.
-     Default 0, 0, 0, 1.
+    /**
+     * Rotation from the frame to the world: a quaternion x, y, z, w with a norm of 1 within 1e-3; it is normalised.
+     * Default 0, 0, 0, 1.
      */
     double orientation[4];
 } isocoat_pose;
 
-/*
- In which moment of a tick a host's velocities live: an ISOCOAT_VELOCITY_ value.
- */
-typedef uint32_t isocoat_velocity_convention;
-
-/*
- Properties of a host-driven link: ISOCOAT_LINK_ flags, added up.
- */
-typedef uint32_t isocoat_link_flags;
-
-/*
- One moving frame of a body. Begin with isocoat_link_desc_default().
- */
-typedef struct isocoat_link_desc {
-    /*
-     Size of this struct in bytes, as the host knows it.
-     */
-    uint32_t struct_size;
-    /*
-     Who moves it. Default ISOCOAT_LINK_FIXED.
-     */
-    isocoat_link_kind kind;
-    /*
-     The link's frame in the world. Default the world's frame.
-     */
-    struct isocoat_pose pose;
-    /*
-     Velocity of the centre of mass in the world, in m/s, finite. Default 0.
-     */
-    double linear_velocity[3];
-    /*
-     Angular velocity in the world, in rad/s, finite. Default 0.
-     */
-    double angular_velocity[3];
-    /*
-     Mass, in kg: > 0 for point masses and rigid solids, at least 0 for host-driven links (0 is kinematic); ignored
-     for fixed ones. Default 0.
-     */
-    double mass;
-    /*
-     Centre of mass in the link's frame, in m, finite; 0 for a point mass. Default 0.
-     */
-    double local_center_of_mass[3];
-    /*
-     Inertia tensor about the centre of mass in the axes of the link's frame, row by row, in kg m^2: symmetric,
-     positive definite, no principal moment above the sum of the other two. For rigid solids and for host-driven
-     links with a mass; ignored otherwise. Default 0. See isocoat_inertia_of_sphere and its like.
-     */
-    double inertia[9];
-    /*
-     Factor on the world's gravity, finite. Default 1.
-     */
-    double gravity_scale;
-    /*
-     Acceleration besides gravity and contact, in the world, in m/s^2, finite. Default 0.
-     */
-    double external_acceleration[3];
-    /*
-     Angular acceleration besides contact and gyroscopic terms, in the world, in rad/s^2, finite. Default 0.
-     */
-    double external_angular_acceleration[3];
-    /*
-     Host-driven links: which moment the host's velocities belong to. Default ISOCOAT_VELOCITY_LEAPFROG.
-     */
-    isocoat_velocity_convention velocity_convention;
-    /*
-     Host-driven links: ISOCOAT_LINK_ flags, added up. Default 0.
-     */
-    isocoat_link_flags flags;
-    /*
-     Host-driven links that joints hold: the 6x6 matrix from wrench at the centre of mass (force, torque) to
-     acceleration (linear, angular), in the world, row by row; symmetric and positive definite. Read only with
-     ISOCOAT_LINK_HAS_INVERSE_EFFECTIVE_INERTIA in flags. Default 0.
-     */
-    double inverse_effective_inertia[36];
-    /*
-     The host's own; given back, otherwise unused. Default NULL.
-     */
-    void *user_data;
-} isocoat_link_desc;
-
-/*
- Handle of a skeleton: a primitive, fixed in a link's frame, that emits a field. The rules of isocoat_body hold.
- */
-typedef struct isocoat_skeleton {
-    /*
-     Slot of the skeleton in its world.
-     */
-    uint32_t index;
-    /*
-     How often the slot was used; 0 only in the null handle.
-     */
-    uint16_t generation;
-    /*
-     Tag of the world; 0 only in the null handle.
-     */
-    uint16_t world;
-} isocoat_skeleton;
-
-/*
- Which primitive a skeleton is: an ISOCOAT_SHAPE_ value. It says what the three points of the descriptor are, all in
- the link's frame, in m.
- */
-typedef uint32_t isocoat_shape;
-
-/*
- A primitive fixed in a link's frame, and the field it emits. Begin with isocoat_skeleton_desc_default().
- */
-typedef struct isocoat_skeleton_desc {
-    /*
-     Size of this struct in bytes, as the host knows it.
-     */
-    uint32_t struct_size;
-    /*
-     Which primitive. Default ISOCOAT_SHAPE_POINT.
-     */
-    isocoat_shape shape;
-    /*
-     What shape says, finite; points that the shape has no use for are ignored. Default 0.
-     */
-    double points[3][3];
-    /*
-     Distance of the surface from an isolated skeleton, in m, > 0 and at most 1e9. Default 0.1.
-     */
-    double thickness;
-    /*
-     Slope of the field at the surface, in 1/m: > 0 and at most 3 isovalue / (radius - thickness); 0 stands for
-     2 isovalue / (radius - thickness). Default 0.
-     */
-    double stiffness;
-    /*
-     Slope of the field at the skeleton over that at the surface: from 0 to 1e6; 1 is linear. Default 1.
-     */
-    double stiffening;
-    /*
-     Distance at which the field ends, in m, larger than thickness and at most 1e9; 0 stands for twice the
-     thickness. Default 0.
-     */
-    double radius;
-    /*
-     Number of seeds: from 4 to 65536; 0 stands for the world's. Default 0.
-     */
-    uint32_t seed_count;
-    /*
-     The host's own; given back, otherwise unused. Default NULL.
-     */
-    void *user_data;
-} isocoat_skeleton_desc;
-
-/*
- Position, orientation and velocities of a link.
- */
-typedef struct isocoat_link_state {
-    /*
-     The link's frame in the world.
-     */
-    struct isocoat_pose pose;
-    /*
-     Velocity of the centre of mass in the world, in m/s, finite.
-     */
-    double linear_velocity[3];
-    /*
-     Angular velocity in the world, in rad/s, finite.
-     */
-    double angular_velocity[3];
-} isocoat_link_state;
-
-/*
- A force and a torque, in the world's axes; or an impulse and an angular impulse.
- */
+/** A force and a torque, in the world's axes; or an impulse and an angular impulse. */
 typedef struct isocoat_wrench {
-    /*
-     Force, in N; as an impulse, in N s.
-     */
+    /** Force, in N; as an impulse, in N s. */
     double force[3];
-    /*
-     Torque about the centre of mass, in N m; as an impulse, in N m s.
-     */
+    /** Torque about the centre of mass, in N m; as an impulse, in N m s. */
     double torque[3];
 } isocoat_wrench;
 
-/*
- Number type of a buffer: an ISOCOAT_FORMAT_ value.
- */
-typedef uint32_t isocoat_format;
-
-/*
- Where a bulk call writes: elements of 3 or 4 numbers in the host's own memory, such as a field of its own structs.
- */
-typedef struct isocoat_buffer {
-    /*
-     First number of the first element; NULL when this result is not wanted.
-     */
-    void *data;
-    /*
-     Bytes from one element to the next: at least the size of an element, or 0 for elements without gaps.
-     */
-    size_t stride;
-    /*
-     Number type.
-     */
-    isocoat_format format;
-} isocoat_buffer;
-
-/*
- Figures of the last step. Begin with isocoat_counters_default().
- */
-typedef struct isocoat_counters {
-    /*
-     Size of this struct in bytes, as the host knows it.
-     */
-    uint32_t struct_size;
-    /*
-     Live bodies.
-     */
-    uint32_t bodies;
-    /*
-     Live links.
-     */
-    uint32_t links;
-    /*
-     Live skeletons.
-     */
-    uint32_t skeletons;
-    /*
-     Pairs of bodies whose bounds met.
-     */
-    uint32_t pairs;
-    /*
-     Groups of bodies that were stepped together.
-     */
-    uint32_t islands;
-    /*
-     Sub-steps of the group that took the most.
-     */
-    uint32_t substeps;
-    /*
-     Pieces of contact surface at the end of the step.
-     */
-    uint32_t patches;
-    /*
-     Evaluations of a pair of fields.
-     */
-    uint64_t evaluations;
-} isocoat_counters;
-
-/*
- One connected piece of contact surface between two coats.
- */
-typedef struct isocoat_contact {
-    /*
-     The first body.
-     */
-    struct isocoat_body body_a;
-    /*
-     The second body.
-     */
-    struct isocoat_body body_b;
-    /*
-     The link of the first body whose field is the highest at the deepest point.
-     */
-    struct isocoat_link link_a;
-    /*
-     The same of the second.
-     */
-    struct isocoat_link link_b;
-    /*
-     The skeleton of the first body whose territory holds the deepest point.
-     */
-    struct isocoat_skeleton skeleton_a;
-    /*
-     The same of the second.
-     */
-    struct isocoat_skeleton skeleton_b;
-    /*
-     Centre of pressure, in m.
-     */
-    double position[3];
-    /*
-     Mean normal, from a to b.
-     */
-    double normal[3];
-    /*
-     Force on b, in N; a has the opposite.
-     */
-    double force[3];
-    /*
-     Torque on b about position, in N m; a has the opposite.
-     */
-    double torque[3];
-    /*
-     Area of the surface, in m^2.
-     */
-    double area;
-    /*
-     Highest pressure, in Pa.
-     */
-    double peak_pressure;
-    /*
-     Normal stiffness, in N/m: the integral of g_a g_b / (g_a + g_b) over the surface.
-     */
-    double stiffness;
-    /*
-     Estimated relative error of the elastic force.
-     */
-    double error_estimate;
-    /*
-     How often the two fields were evaluated.
-     */
-    uint32_t evaluations;
-    /*
-     The scheme that integrated it.
-     */
-    isocoat_scheme scheme;
-    /*
-     1 if the load is past the most that this contact can carry, else 0.
-     */
-    uint32_t overloaded;
-    /*
-     0.
-     */
-    uint32_t reserved;
-} isocoat_contact;
-
-/*
- What happened to a pair of bodies: an ISOCOAT_EVENT_ value. More may come.
- */
-typedef uint32_t isocoat_event_kind;
-
-/*
- A change between two bodies in the last step.
- */
-typedef struct isocoat_event {
-    /*
-     What happened.
-     */
-    isocoat_event_kind kind;
-    /*
-     0.
-     */
-    uint32_t reserved;
-    /*
-     The first body; it may have been destroyed since.
-     */
-    struct isocoat_body body_a;
-    /*
-     The second body; it may have been destroyed since.
-     */
-    struct isocoat_body body_b;
-} isocoat_event;
-
-/*
- Done.
- */
-#define ISOCOAT_OK 0
-
-/*
- A pointer is NULL that must not be, a struct_size or an enum value is unknown, a count or a stride makes no sense.
- */
-#define ISOCOAT_ERROR_INVALID_ARGUMENT 1
-
-/*
- A handle is null, belongs to another world, or its object was destroyed.
- */
-#define ISOCOAT_ERROR_INVALID_HANDLE 2
-
-/*
- A number is outside its range, or is not a number.
- */
-#define ISOCOAT_ERROR_OUT_OF_RANGE 3
-
-/*
- The call makes no sense for this object, or this version of the library cannot do it.
- */
-#define ISOCOAT_ERROR_UNSUPPORTED 4
-
-/*
- A limit of the library is reached.
- */
-#define ISOCOAT_ERROR_CAPACITY 5
-
-/*
- The buffer is too small: the call has written the count it needs, and nothing else.
- */
-#define ISOCOAT_ERROR_BUFFER_TOO_SMALL 6
-
-/*
- The world is being stepped or changed, or it is being read and the call would change it. Calls from the callbacks
- of a step get this code too.
- */
-#define ISOCOAT_ERROR_LOCKED 7
-
-/*
- An internal error has left the world in an unknown state: it can only be destroyed.
- */
-#define ISOCOAT_ERROR_POISONED 8
-
-/*
- The library chooses; today always ISOCOAT_RESPONSE_SUBSTEPPED.
- */
-#define ISOCOAT_RESPONSE_AUTO 0
-
-/*
- One evaluation of the forces a step, at its beginning: for small steps only.
- */
-#define ISOCOAT_RESPONSE_EXPLICIT 1
-
-/*
- One implicit solve a step. Not in this version: gives ISOCOAT_ERROR_UNSUPPORTED.
- */
-#define ISOCOAT_RESPONSE_IMPLICIT 2
-
-/*
- Many small steps inside each step; host-driven links through a mirror that lasts from step to step.
- */
-#define ISOCOAT_RESPONSE_SUBSTEPPED 3
-
-/*
- The cheapest that meets the tolerance.
- */
-#define ISOCOAT_SCHEME_AUTO 0
-
-/*
- Closed form; pairs without one take ISOCOAT_SCHEME_POLAR.
- */
-#define ISOCOAT_SCHEME_CLOSED_FORM 1
-
-/*
- A polar Gauss patch round the deepest point.
- */
-#define ISOCOAT_SCHEME_POLAR 2
-
-/*
- Subdivision that adapts to the border of the contact.
- */
-#define ISOCOAT_SCHEME_ADAPTIVE 3
-
-/*
- Seeds on the surfaces, as in the papers.
- */
-#define ISOCOAT_SCHEME_SEEDS 4
-
-/*
- Worth knowing.
- */
-#define ISOCOAT_LOG_INFO 0
-
-/*
- The scene cannot do what it seems to be meant to.
- */
-#define ISOCOAT_LOG_WARNING 1
-
-/*
- Its coat gives way under load.
- */
-#define ISOCOAT_BODY_DEFORMABLE 0
-
-/*
- Its coat keeps its shape; in a contact all the flesh that gives way is the other body's.
- */
-#define ISOCOAT_BODY_RIGID 1
-
-/*
- Nobody: it stays where it is put. Mass and inertia are ignored.
- */
-#define ISOCOAT_LINK_FIXED 0
-
-/*
- The host sets pose and velocity every tick. With a mass, it is given impulses to apply; without, it is kinematic.
- */
-#define ISOCOAT_LINK_HOST 1
-
-/*
- The library: a mass that moves but does not turn.
- */
-#define ISOCOAT_LINK_POINT_MASS 2
-
-/*
- The library: a rigid solid with an inertia tensor.
- */
-#define ISOCOAT_LINK_RIGID 3
-
-/*
- Semi-implicit Euler, as Bullet: v += a dt, then x += v dt. Velocities lag half a tick behind positions.
- */
-#define ISOCOAT_VELOCITY_LEAPFROG 0
-
-/*
- Velocities belong to the same moment as the positions: x += v dt + a dt^2/2, then v += a dt.
- */
-#define ISOCOAT_VELOCITY_SYNCHRONOUS 1
-
-/*
- The host itself applies the gyroscopic torque.
- */
-#define ISOCOAT_LINK_HOST_GYROSCOPIC 1
-
-/*
- Joints or contacts of the host act on the link in this tick.
- */
-#define ISOCOAT_LINK_CONSTRAINED 2
-
-/*
- The field inverse_effective_inertia is given.
- */
-#define ISOCOAT_LINK_HAS_INVERSE_EFFECTIVE_INERTIA 4
-
-/*
- A point: points[0].
- */
-#define ISOCOAT_SHAPE_POINT 0
-
-/*
- A segment from points[0] to points[1]; a point if they are one.
- */
-#define ISOCOAT_SHAPE_SEGMENT 1
-
-/*
- A triangle of points[0], points[1], points[2]; a segment or a point if it has no area.
- */
-#define ISOCOAT_SHAPE_TRIANGLE 2
-
-/*
- A solid box: points[0] is its centre, points[1] its half extents, each > 0, points[2] the rotation of its axes as a
- vector (axis times angle, in rad).
- */
-#define ISOCOAT_SHAPE_BOX 3
-
-/*
- A half-space: points[0] is a point of its boundary, points[1] the outward normal, of any length but 0. For fixed links only.
- */
-#define ISOCOAT_SHAPE_PLANE 4
-
-/*
- Numbers are double.
- */
-#define ISOCOAT_FORMAT_F64 0
-
-/*
- Numbers are float, rounded to nearest.
- */
-#define ISOCOAT_FORMAT_F32 1
-
-/*
- The coats began to touch.
- */
-#define ISOCOAT_EVENT_BEGIN 0
-
-/*
- The coats stopped touching.
- */
-#define ISOCOAT_EVENT_END 1
-
-/*
- The contact went past the most it can carry.
- */
-#define ISOCOAT_EVENT_OVERLOAD 2
-
-#ifdef __cplusplus
-extern "C" {
-#endif // __cplusplus
-
-/*
- The message of the last call on this thread that did not return ISOCOAT_OK: what was wrong, with the value and the
- range. Calls that succeed leave it as it is.
-
- - buffer: receives the message with a terminating zero, cut to fit; may be NULL when capacity is 0.
- - capacity: bytes in buffer.
-
- Returns the length of the whole message in bytes, without the terminating zero; 0 when no call has failed yet.
- Threads: any.
- */
-size_t isocoat_last_error(char *buffer, size_t capacity);
-
-/*
- The name of a status, such as "ISOCOAT_ERROR_LOCKED"; "unknown status" for a number that is none.
-
- Lifetime: static. Threads: any.
- */
-const char *isocoat_status_name(isocoat_status status);
-
-/*
- The version of the library that runs, as ISOCOAT_VERSION packs it: major << 22 | minor << 12 | patch.
-
- Threads: any.
- */
-uint32_t isocoat_version(void);
-
-/*
- The version of the library that runs, such as "0.1.0".
-
- Lifetime: static. Threads: any.
- */
-const char *isocoat_version_string(void);
-
-/*
- What isocoat_check_abi calls: compares a host's version and struct sizes with the library's.
-
- - version: ISOCOAT_VERSION of the header that the host was compiled with.
- - sizes: sizeof of the structs, in the header's order; not NULL unless count is 0.
- - count: number of sizes; a count other than this library's own compares what both know.
-
- Errors: UNSUPPORTED when they do not fit together; INVALID_ARGUMENT. Threads: any.
- */
-ISOCOAT_MUST_USE isocoat_status isocoat_check_abi_of(uint32_t version, const uint32_t *sizes, size_t count);
-
-/*
- Inertia tensor of a solid ball about its centre: 2/5 m r^2 about every axis.
-
- - mass: in kg, > 0.
- - radius: in m, > 0.
- - inertia: receives 9 doubles, row by row, in kg m^2; not NULL.
-
- Errors: OUT_OF_RANGE, INVALID_ARGUMENT. Threads: any.
-
+/**
+ * Inertia tensor of a solid ball about its centre: 2/5 m r^2 about every axis.
+ *
+ * - mass: in kg, > 0.
+ * - radius: in m, > 0.
+ * - inertia: receives 9 doubles, row by row, in kg m^2; not NULL.
+ *
+ * Errors: OUT_OF_RANGE, INVALID_ARGUMENT. Threads: any.
  */
 ISOCOAT_MUST_USE isocoat_status isocoat_inertia_of_sphere(double mass, double radius, double inertia[9]);
 
-/*
- Inertia tensor of a solid box about its centre, in its own axes: m/3 (b^2 + c^2) about the axis of half extent a.
-
- - mass: in kg, > 0.
- - half_extents: 3 doubles, in m, each > 0; not NULL.
- - inertia: receives 9 doubles, row by row, in kg m^2; not NULL.
-
- Errors: OUT_OF_RANGE, INVALID_ARGUMENT. Threads: any.
-
+/**
+ * Inertia tensor of a solid box about its centre, in its own axes: m/3 (b^2 + c^2) about the axis of half extent a.
+ *
+ * - mass: in kg, > 0.
+ * - half_extents: 3 doubles, in m, each > 0; not NULL.
+ * - inertia: receives 9 doubles, row by row, in kg m^2; not NULL.
+ *
+ * Errors: OUT_OF_RANGE, INVALID_ARGUMENT. Threads: any.
  */
 ISOCOAT_MUST_USE isocoat_status isocoat_inertia_of_box(double mass, const double half_extents[3], double inertia[9]);
 
-/*
- Inertia tensor of a solid capsule along z about its centre: a cylinder between two half balls, of one density.
-
- - mass: in kg, > 0.
- - radius: in m, > 0.
- - half_length: from the centre to the centre of a half ball, in m, at least 0 (0 is a ball).
- - inertia: receives 9 doubles, row by row, in kg m^2; not NULL.
-
- Errors: OUT_OF_RANGE, INVALID_ARGUMENT. Threads: any.
-
+/**
+ * Inertia tensor of a solid capsule along z about its centre: a cylinder between two half balls, of one density.
+ *
+ * - mass: in kg, > 0.
+ * - radius: in m, > 0.
+ * - half_length: from the centre to the centre of a half ball, in m, at least 0 (0 is a ball).
+ * - inertia: receives 9 doubles, row by row, in kg m^2; not NULL.
+ *
+ * Errors: OUT_OF_RANGE, INVALID_ARGUMENT. Threads: any.
  */
 ISOCOAT_MUST_USE
 isocoat_status isocoat_inertia_of_capsule(double mass,
@@ -899,762 +230,1344 @@ isocoat_status isocoat_inertia_of_capsule(double mass,
                                           double half_length,
                                           double inertia[9]);
 
-/*
- Fills a descriptor with its defaults; isocoat_world_desc_default() calls it.
+/* ---- World ------------------------------------------------------------------------------------------------------- */
 
- - desc: receives at most size bytes, its struct_size among them; not NULL.
- - size: sizeof(isocoat_world_desc) as the host was compiled.
+/** A world: it owns every body, link and skeleton; one step advances it. Worlds are independent of each other. */
+typedef struct isocoat_world isocoat_world;
 
- Errors: INVALID_ARGUMENT. Threads: any.
+/** How contact forces act on the links in time: an ISOCOAT_RESPONSE_ value. */
+typedef uint32_t isocoat_response;
+
+/** The library chooses; today always ISOCOAT_RESPONSE_SUBSTEPPED. */
+#define ISOCOAT_RESPONSE_AUTO 0u
+/** One evaluation of the forces a step, at its beginning: for small steps only. */
+#define ISOCOAT_RESPONSE_EXPLICIT 1u
+/** One implicit solve a step. Not in this version: gives ISOCOAT_ERROR_UNSUPPORTED. */
+#define ISOCOAT_RESPONSE_IMPLICIT 2u
+/** Many small steps inside each step; host-driven links through a mirror that lasts from step to step. */
+#define ISOCOAT_RESPONSE_SUBSTEPPED 3u
+
+/** How a contact surface is integrated: an ISOCOAT_SCHEME_ value. */
+typedef uint32_t isocoat_scheme;
+
+/** The cheapest that meets the tolerance. */
+#define ISOCOAT_SCHEME_AUTO 0u
+/** Closed form; pairs without one take ISOCOAT_SCHEME_POLAR. */
+#define ISOCOAT_SCHEME_CLOSED_FORM 1u
+/** A polar Gauss patch round the deepest point. */
+#define ISOCOAT_SCHEME_POLAR 2u
+/** Subdivision that adapts to the border of the contact. */
+#define ISOCOAT_SCHEME_ADAPTIVE 3u
+/** Seeds on the surfaces, as in the papers. */
+#define ISOCOAT_SCHEME_SEEDS 4u
+
+/** Settings of a world. Begin with isocoat_world_desc_default(). */
+typedef struct isocoat_world_desc {
+    /** Size of this struct in bytes, as the host knows it. */
+    uint32_t struct_size;
+    /** How contact forces act in time. Default ISOCOAT_RESPONSE_AUTO. */
+    isocoat_response response;
+    /** How contact surfaces are integrated. Default ISOCOAT_SCHEME_AUTO. */
+    isocoat_scheme scheme;
+    /** Seeds of a skeleton that does not say its own number: from 4 to 65536. Default 64. */
+    uint32_t seed_count;
+    /** Upper bound of the sub-steps in one step: from 1 to 65536. Default 4096. */
+    uint32_t max_substeps;
+    /** Acceleration of gravity, in m/s^2, finite. Default 0. */
+    double gravity[3];
+    /** Relative error accepted in a contact force: from 1e-9 to 0.5. Default 5e-3. */
+    double force_tolerance;
+    /** Largest product of contact frequency and sub-step, in rad: from 0.01 to 1. Default 0.2. */
+    double substep_phase;
+} isocoat_world_desc;
+
+/** How much a message matters: an ISOCOAT_LOG_ value. More may come. */
+typedef uint32_t isocoat_log_level;
+
+/** Worth knowing. */
+#define ISOCOAT_LOG_INFO 0u
+/** The scene cannot do what it seems to be meant to. */
+#define ISOCOAT_LOG_WARNING 1u
+
+/**
+ * Receives the messages of a world, on the thread of the call that has something to say.
+ *
+ * - context: as given to isocoat_world_set_log.
+ * - level: an ISOCOAT_LOG_ value.
+ * - message: UTF-8; valid during the call.
+ *
+ * It must return (no longjmp, no exception); calls on the world from here give ISOCOAT_ERROR_LOCKED.
  */
-isocoat_status isocoat_world_desc_init(struct isocoat_world_desc *desc, size_t size);
+typedef void (*isocoat_log_fn)(void *context, isocoat_log_level level, const char *message);
 
-/*
- Creates an empty world.
+/**
+ * Says whether two bodies may touch; called in a step for each pair whose bounds meet, after categories and masks.
+ *
+ * - context: as given to isocoat_world_set_pair_filter.
+ * - body_a, body_b: the pair.
+ *
+ * It must return (no longjmp, no exception), the same answer for the same pair within a step; calls on the world from
+ * here give ISOCOAT_ERROR_LOCKED.
+ */
+typedef bool (*isocoat_pair_filter_fn)(void *context, isocoat_body body_a, isocoat_body body_b);
 
- - desc: settings; not NULL.
- - world: receives the world; not NULL. Destroy it with isocoat_world_destroy.
+/**
+ * Fills a descriptor with its defaults; isocoat_world_desc_default() calls it.
+ *
+ * - desc: receives at most size bytes, its struct_size among them; not NULL.
+ * - size: sizeof(isocoat_world_desc) as the host was compiled.
+ *
+ * Errors: INVALID_ARGUMENT. Threads: any.
+ */
+isocoat_status isocoat_world_desc_init(isocoat_world_desc *desc, size_t size);
 
- Errors: INVALID_ARGUMENT, OUT_OF_RANGE, UNSUPPORTED. Threads: any.
+/**
+ * Creates an empty world.
+ *
+ * - desc: settings; not NULL.
+ * - world: receives the world; not NULL. Destroy it with isocoat_world_destroy.
+ *
+ * Errors: INVALID_ARGUMENT, OUT_OF_RANGE, UNSUPPORTED. Threads: any.
+ */
+ISOCOAT_MUST_USE isocoat_status isocoat_world_create(const isocoat_world_desc *desc, isocoat_world **world);
+
+/**
+ * Destroys a world with all it owns. Its handles, views and the pointer itself are void afterwards.
+ *
+ * - world: NULL does nothing.
+ *
+ * Errors: LOCKED while the world is used, its own callbacks included; it then lives on. Poisoned worlds are destroyed
+ * too. Threads: changes the world.
+ */
+isocoat_status isocoat_world_destroy(isocoat_world *world);
+
+/**
+ * Advances a world: contacts, forces, and the motion of the links that the library integrates. Voids the views of the
+ * step before.
+ *
+ * - world: not NULL.
+ * - dt: length of the step, in s, > 0 and at most 10.
+ *
+ * Errors: OUT_OF_RANGE. Threads: changes the world; the log callback and the pair filter are called from here.
+ */
+ISOCOAT_MUST_USE isocoat_status isocoat_world_step(isocoat_world *world, double dt);
+
+/**
+ * The settings of a world.
+ *
+ * - world: not NULL.
+ * - desc: receives them; not NULL, with struct_size set.
+ *
+ * Errors: INVALID_ARGUMENT. Threads: reads the world.
+ */
+ISOCOAT_MUST_USE isocoat_status isocoat_world_get_desc(const isocoat_world *world, isocoat_world_desc *desc);
+
+/**
+ * Changes the settings of a world, from the next step on.
+ *
+ * - world: not NULL.
+ * - desc: the new settings; not NULL.
+ *
+ * Errors: INVALID_ARGUMENT, OUT_OF_RANGE, UNSUPPORTED. Threads: changes the world.
+ */
+ISOCOAT_MUST_USE isocoat_status isocoat_world_set_desc(isocoat_world *world, const isocoat_world_desc *desc);
+
+/**
+ * Sets who receives the messages of a world. Without one they are dropped; nothing is ever printed.
+ *
+ * - world: not NULL.
+ * - log: the function; NULL for none.
+ * - context: given to it, otherwise unused; may be NULL. It must outlive the world or the next set.
+ *
+ * Threads: changes the world.
+ */
+ISOCOAT_MUST_USE isocoat_status isocoat_world_set_log(isocoat_world *world, isocoat_log_fn log, void *context);
+
+/**
+ * Sets who decides about pairs of bodies.
+ *
+ * - world: not NULL.
+ * - filter: the function; NULL lets every pair touch that categories and masks allow.
+ * - context: given to it, otherwise unused; may be NULL. It must outlive the world or the next set.
+ *
+ * Threads: changes the world.
  */
 ISOCOAT_MUST_USE
-isocoat_status isocoat_world_create(const struct isocoat_world_desc *desc,
-                                    struct isocoat_world **world);
-
-/*
- Destroys a world with all it owns. Its handles, views and the pointer itself are void afterwards.
-
- - world: NULL does nothing.
-
- Errors: LOCKED while the world is used, its own callbacks included; it then lives on. Poisoned worlds are destroyed
- too. Threads: changes the world.
- */
-isocoat_status isocoat_world_destroy(struct isocoat_world *world);
-
-/*
- Advances a world: contacts, forces, and the motion of the links that the library integrates. Voids the views of the
- step before.
-
- - world: not NULL.
- - dt: length of the step, in s, > 0 and at most 10.
-
- Errors: OUT_OF_RANGE. Threads: changes the world; the log callback and the pair filter are called from here.
- */
-ISOCOAT_MUST_USE isocoat_status isocoat_world_step(struct isocoat_world *world, double dt);
-
-/*
- The settings of a world.
-
- - world: not NULL.
- - desc: receives them; not NULL, with struct_size set.
-
- Errors: INVALID_ARGUMENT. Threads: reads the world.
- */
-ISOCOAT_MUST_USE
-isocoat_status isocoat_world_get_desc(const struct isocoat_world *world,
-                                      struct isocoat_world_desc *desc);
-
-/*
- Changes the settings of a world, from the next step on.
-
- - world: not NULL.
- - desc: the new settings; not NULL.
-
- Errors: INVALID_ARGUMENT, OUT_OF_RANGE, UNSUPPORTED. Threads: changes the world.
- */
-ISOCOAT_MUST_USE
-isocoat_status isocoat_world_set_desc(struct isocoat_world *world,
-                                      const struct isocoat_world_desc *desc);
-
-/*
- Sets who receives the messages of a world. Without one they are dropped; nothing is ever printed.
-
- - world: not NULL.
- - log: the function; NULL for none.
- - context: given to it, otherwise unused; may be NULL. It must outlive the world or the next set.
-
- Threads: changes the world.
- */
-ISOCOAT_MUST_USE isocoat_status isocoat_world_set_log(struct isocoat_world *world, isocoat_log_fn log, void *context);
-
-/*
- Sets who decides about pairs of bodies.
-
- - world: not NULL.
- - filter: the function; NULL lets every pair touch that categories and masks allow.
- - context: given to it, otherwise unused; may be NULL. It must outlive the world or the next set.
-
- Threads: changes the world.
- */
-ISOCOAT_MUST_USE
-isocoat_status isocoat_world_set_pair_filter(struct isocoat_world *world,
+isocoat_status isocoat_world_set_pair_filter(isocoat_world *world,
                                              isocoat_pair_filter_fn filter,
                                              void *context);
 
-/*
- Fills a descriptor with its defaults; isocoat_body_desc_default() calls it.
+/* ---- Bodies ------------------------------------------------------------------------------------------------------ */
 
- - desc: receives at most size bytes, its struct_size among them; not NULL.
- - size: sizeof(isocoat_body_desc) as the host was compiled.
+/** What a body is made of: an ISOCOAT_BODY_ value. */
+typedef uint32_t isocoat_body_kind;
 
- Errors: INVALID_ARGUMENT. Threads: any.
+/** Its coat gives way under load. */
+#define ISOCOAT_BODY_DEFORMABLE 0u
+/** Its coat keeps its shape; in a contact all the flesh that gives way is the other body's. */
+#define ISOCOAT_BODY_RIGID 1u
+
+/** One object: what its coat is made of. Begin with isocoat_body_desc_default(). */
+typedef struct isocoat_body_desc {
+    /** Size of this struct in bytes, as the host knows it. */
+    uint32_t struct_size;
+    /** What it is made of. Default ISOCOAT_BODY_DEFORMABLE. */
+    isocoat_body_kind kind;
+    /** Field value on the surface, > 1e-9 and at most 1e9. Default 1. */
+    double isovalue;
+    /** Pressure a unit of field, in Pa, > 0 and at most 1e18. Default 1e5. */
+    double stiffness_scale;
+    /** Coefficient of Coulomb friction, at least 0; a pair takes the geometric mean. Default 0. */
+    double friction;
+    /** Coefficient of static friction: 0 (off), or at least friction; a pair takes the geometric mean. Default 0. */
+    double static_friction;
+    /** Viscous friction, in sqrt(N s/m^3), at least 0; a pair takes the product. Default 0. */
+    double viscous_friction;
+    /**
+     * Hunt-Crossley dissipation, in s/m, at least 0; a pair takes the mean weighted by the other's softness. Default 0.
+     */
+    double dissipation;
+    /** What this body is, as bits. Default 1. */
+    uint64_t category;
+    /**
+     * Which categories it touches, as bits; two bodies touch when each one's mask has a bit of the other's category.
+     * Default all.
+     */
+    uint64_t mask;
+    /** The host's own; given back, otherwise unused. Default NULL. */
+    void *user_data;
+} isocoat_body_desc;
+
+/**
+ * Fills a descriptor with its defaults; isocoat_body_desc_default() calls it.
+ *
+ * - desc: receives at most size bytes, its struct_size among them; not NULL.
+ * - size: sizeof(isocoat_body_desc) as the host was compiled.
+ *
+ * Errors: INVALID_ARGUMENT. Threads: any.
  */
-isocoat_status isocoat_body_desc_init(struct isocoat_body_desc *desc, size_t size);
+isocoat_status isocoat_body_desc_init(isocoat_body_desc *desc, size_t size);
 
-/*
- Creates a body without links.
-
- - world: not NULL.
- - desc: what it is made of; not NULL.
- - body: receives the handle; not NULL.
-
- Errors: INVALID_ARGUMENT, OUT_OF_RANGE, CAPACITY. Threads: changes the world.
- */
-ISOCOAT_MUST_USE
-isocoat_status isocoat_body_create(struct isocoat_world *world,
-                                   const struct isocoat_body_desc *desc,
-                                   struct isocoat_body *body);
-
-/*
- Destroys a body with its links and skeletons.
-
- - world: not NULL.
- - body: the body; its handle and those of its links and skeletons are stale afterwards.
-
- Errors: INVALID_HANDLE. Threads: changes the world.
- */
-ISOCOAT_MUST_USE isocoat_status isocoat_body_destroy(struct isocoat_world *world, struct isocoat_body body);
-
-/*
- The descriptor of a body.
-
- - world: not NULL.
- - body: the body.
- - desc: receives it; not NULL, with struct_size set.
-
- Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
- */
-ISOCOAT_MUST_USE
-isocoat_status isocoat_body_get_desc(const struct isocoat_world *world,
-                                     struct isocoat_body body,
-                                     struct isocoat_body_desc *desc);
-
-/*
- Changes a body, from the next step on. A new isovalue must suit the profiles of all its skeletons.
-
- - world: not NULL.
- - body: the body.
- - desc: the new descriptor, whole; not NULL.
-
- Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE. Threads: changes the world.
- */
-ISOCOAT_MUST_USE
-isocoat_status isocoat_body_set_desc(struct isocoat_world *world,
-                                     struct isocoat_body body,
-                                     const struct isocoat_body_desc *desc);
-
-/*
- Takes a body out of the simulation, or puts it back. New bodies are enabled.
-
- - world: not NULL.
- - body: the body.
- - enabled: whether it takes part.
-
- Errors: INVALID_HANDLE. Threads: changes the world.
+/**
+ * Creates a body without links.
+ *
+ * - world: not NULL.
+ * - desc: what it is made of; not NULL.
+ * - body: receives the handle; not NULL.
+ *
+ * Errors: INVALID_ARGUMENT, OUT_OF_RANGE, CAPACITY. Threads: changes the world.
  */
 ISOCOAT_MUST_USE
-isocoat_status isocoat_body_set_enabled(struct isocoat_world *world,
-                                        struct isocoat_body body,
-                                        bool enabled);
+isocoat_status isocoat_body_create(isocoat_world *world,
+                                   const isocoat_body_desc *desc,
+                                   isocoat_body *body);
 
-/*
- Whether a body takes part in the simulation.
+/**
+ * Destroys a body with its links and skeletons.
+ *
+ * - world: not NULL.
+ * - body: the body; its handle and those of its links and skeletons are stale afterwards.
+ *
+ * Errors: INVALID_HANDLE. Threads: changes the world.
+ */
+ISOCOAT_MUST_USE isocoat_status isocoat_body_destroy(isocoat_world *world, isocoat_body body);
 
- - world: not NULL.
- - body: the body.
- - enabled: receives the answer; not NULL.
-
- Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
+/**
+ * The descriptor of a body.
+ *
+ * - world: not NULL.
+ * - body: the body.
+ * - desc: receives it; not NULL, with struct_size set.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
  */
 ISOCOAT_MUST_USE
-isocoat_status isocoat_body_is_enabled(const struct isocoat_world *world,
-                                       struct isocoat_body body,
-                                       bool *enabled);
+isocoat_status isocoat_body_get_desc(const isocoat_world *world,
+                                     isocoat_body body,
+                                     isocoat_body_desc *desc);
 
-/*
- The host's own pointer of a body.
-
- - world: not NULL.
- - body: the body.
- - user_data: receives the pointer; not NULL.
-
- Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
+/**
+ * Changes a body, from the next step on. A new isovalue must suit the profiles of all its skeletons.
+ *
+ * - world: not NULL.
+ * - body: the body.
+ * - desc: the new descriptor, whole; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE. Threads: changes the world.
  */
 ISOCOAT_MUST_USE
-isocoat_status isocoat_body_get_user_data(const struct isocoat_world *world,
-                                          struct isocoat_body body,
+isocoat_status isocoat_body_set_desc(isocoat_world *world,
+                                     isocoat_body body,
+                                     const isocoat_body_desc *desc);
+
+/**
+ * Takes a body out of the simulation, or puts it back. New bodies are enabled.
+ *
+ * - world: not NULL.
+ * - body: the body.
+ * - enabled: whether it takes part.
+ *
+ * Errors: INVALID_HANDLE. Threads: changes the world.
+ */
+ISOCOAT_MUST_USE isocoat_status isocoat_body_set_enabled(isocoat_world *world, isocoat_body body, bool enabled);
+
+/**
+ * Whether a body takes part in the simulation.
+ *
+ * - world: not NULL.
+ * - body: the body.
+ * - enabled: receives the answer; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
+ */
+ISOCOAT_MUST_USE isocoat_status isocoat_body_is_enabled(const isocoat_world *world, isocoat_body body, bool *enabled);
+
+/**
+ * The host's own pointer of a body.
+ *
+ * - world: not NULL.
+ * - body: the body.
+ * - user_data: receives the pointer; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_body_get_user_data(const isocoat_world *world,
+                                          isocoat_body body,
                                           void **user_data);
 
-/*
- The links of a body, in the order of their creation.
-
- - world: not NULL.
- - body: the body.
- - links: receives the handles; NULL with capacity 0 asks for the count only.
- - capacity: handles that links can hold.
- - count: receives the number of links, also when links is too small; not NULL.
-
- Errors: INVALID_HANDLE, INVALID_ARGUMENT, BUFFER_TOO_SMALL. Threads: reads the world.
+/**
+ * The links of a body, in the order of their creation.
+ *
+ * - world: not NULL.
+ * - body: the body.
+ * - links: receives the handles; NULL with capacity 0 asks for the count only.
+ * - capacity: handles that links can hold.
+ * - count: receives the number of links, also when links is too small; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, BUFFER_TOO_SMALL. Threads: reads the world.
  */
 ISOCOAT_MUST_USE
-isocoat_status isocoat_body_get_links(const struct isocoat_world *world,
-                                      struct isocoat_body body,
-                                      struct isocoat_link *links,
+isocoat_status isocoat_body_get_links(const isocoat_world *world,
+                                      isocoat_body body,
+                                      isocoat_link *links,
                                       size_t capacity,
                                       size_t *count);
 
-/*
- Fills a descriptor with its defaults; isocoat_link_desc_default() calls it.
+/* ---- Links ------------------------------------------------------------------------------------------------------- */
 
- - desc: receives at most size bytes, its struct_size among them; not NULL.
- - size: sizeof(isocoat_link_desc) as the host was compiled.
+/** Who moves a link: an ISOCOAT_LINK_ value. */
+typedef uint32_t isocoat_link_kind;
 
- Errors: INVALID_ARGUMENT. Threads: any.
+/** Nobody: it stays where it is put. Mass and inertia are ignored. */
+#define ISOCOAT_LINK_FIXED 0u
+/** The host sets pose and velocity every tick. With a mass, it is given impulses to apply; without, it is kinematic. */
+#define ISOCOAT_LINK_HOST 1u
+/** The library: a mass that moves but does not turn. */
+#define ISOCOAT_LINK_POINT_MASS 2u
+/** The library: a rigid solid with an inertia tensor. */
+#define ISOCOAT_LINK_RIGID 3u
+
+/** In which moment of a tick a host's velocities live: an ISOCOAT_VELOCITY_ value. */
+typedef uint32_t isocoat_velocity_convention;
+
+/** Semi-implicit Euler, as Bullet: v += a dt, then x += v dt. Velocities lag half a tick behind positions. */
+#define ISOCOAT_VELOCITY_LEAPFROG 0u
+/** Velocities belong to the same moment as the positions: x += v dt + a dt^2/2, then v += a dt. */
+#define ISOCOAT_VELOCITY_SYNCHRONOUS 1u
+
+/** Properties of a host-driven link: ISOCOAT_LINK_ flags, added up. */
+typedef uint32_t isocoat_link_flags;
+
+/** The host itself applies the gyroscopic torque. */
+#define ISOCOAT_LINK_HOST_GYROSCOPIC 1u
+/** Joints or contacts of the host act on the link in this tick. */
+#define ISOCOAT_LINK_CONSTRAINED 2u
+/** The field inverse_effective_inertia is given. */
+#define ISOCOAT_LINK_HAS_INVERSE_EFFECTIVE_INERTIA 4u
+
+/** One moving frame of a body. Begin with isocoat_link_desc_default(). */
+typedef struct isocoat_link_desc {
+    /** Size of this struct in bytes, as the host knows it. */
+    uint32_t struct_size;
+    /** Who moves it. Default ISOCOAT_LINK_FIXED. */
+    isocoat_link_kind kind;
+    /** The link's frame in the world. Default the world's frame. */
+    isocoat_pose pose;
+    /** Velocity of the centre of mass in the world, in m/s, finite. Default 0. */
+    double linear_velocity[3];
+    /** Angular velocity in the world, in rad/s, finite. Default 0. */
+    double angular_velocity[3];
+    /**
+     * Mass, in kg: > 0 for point masses and rigid solids, at least 0 for host-driven links (0 is kinematic); ignored
+     * for fixed ones. Default 0.
+     */
+    double mass;
+    /** Centre of mass in the link's frame, in m, finite; 0 for a point mass. Default 0. */
+    double local_center_of_mass[3];
+    /**
+     * Inertia tensor about the centre of mass in the axes of the link's frame, row by row, in kg m^2: symmetric,
+     * positive definite, no principal moment above the sum of the other two. For rigid solids and for host-driven
+     * links with a mass; ignored otherwise. Default 0. See isocoat_inertia_of_sphere and its like.
+     */
+    double inertia[9];
+    /** Factor on the world's gravity, finite. Default 1. */
+    double gravity_scale;
+    /** Acceleration besides gravity and contact, in the world, in m/s^2, finite. Default 0. */
+    double external_acceleration[3];
+    /** Angular acceleration besides contact and gyroscopic terms, in the world, in rad/s^2, finite. Default 0. */
+    double external_angular_acceleration[3];
+    /** Host-driven links: which moment the host's velocities belong to. Default ISOCOAT_VELOCITY_LEAPFROG. */
+    isocoat_velocity_convention velocity_convention;
+    /** Host-driven links: ISOCOAT_LINK_ flags, added up. Default 0. */
+    isocoat_link_flags flags;
+    /**
+     * Host-driven links that joints hold: the 6x6 matrix from wrench at the centre of mass (force, torque) to
+     * acceleration (linear, angular), in the world, row by row; symmetric and positive definite. Read only with
+     * ISOCOAT_LINK_HAS_INVERSE_EFFECTIVE_INERTIA in flags. Default 0.
+     */
+    double inverse_effective_inertia[36];
+    /** The host's own; given back, otherwise unused. Default NULL. */
+    void *user_data;
+} isocoat_link_desc;
+
+/**
+ * Fills a descriptor with its defaults; isocoat_link_desc_default() calls it.
+ *
+ * - desc: receives at most size bytes, its struct_size among them; not NULL.
+ * - size: sizeof(isocoat_link_desc) as the host was compiled.
+ *
+ * Errors: INVALID_ARGUMENT. Threads: any.
  */
-isocoat_status isocoat_link_desc_init(struct isocoat_link_desc *desc, size_t size);
+isocoat_status isocoat_link_desc_init(isocoat_link_desc *desc, size_t size);
 
-/*
- Creates a link of a body, without skeletons.
-
- - world: not NULL.
- - body: the body it belongs to.
- - desc: the link; not NULL.
- - link: receives the handle; not NULL.
-
- Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE, CAPACITY. Threads: changes the world.
- */
-ISOCOAT_MUST_USE
-isocoat_status isocoat_link_create(struct isocoat_world *world,
-                                   struct isocoat_body body,
-                                   const struct isocoat_link_desc *desc,
-                                   struct isocoat_link *link);
-
-/*
- Destroys a link with its skeletons.
-
- - world: not NULL.
- - link: the link; its handle and those of its skeletons are stale afterwards.
-
- Errors: INVALID_HANDLE. Threads: changes the world.
- */
-ISOCOAT_MUST_USE isocoat_status isocoat_link_destroy(struct isocoat_world *world, struct isocoat_link link);
-
-/*
- The descriptor of a link, with its present pose and velocities.
-
- - world: not NULL.
- - link: the link.
- - desc: receives it; not NULL, with struct_size set.
-
- Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
- */
-ISOCOAT_MUST_USE
-isocoat_status isocoat_link_get_desc(const struct isocoat_world *world,
-                                     struct isocoat_link link,
-                                     struct isocoat_link_desc *desc);
-
-/*
- Changes a link, its pose and velocities included.
-
- - world: not NULL.
- - link: the link.
- - desc: the new descriptor, whole; not NULL.
-
- Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE, UNSUPPORTED. Threads: changes the world.
- */
-ISOCOAT_MUST_USE
-isocoat_status isocoat_link_set_desc(struct isocoat_world *world,
-                                     struct isocoat_link link,
-                                     const struct isocoat_link_desc *desc);
-
-/*
- Takes a link and its skeletons out of the simulation, or puts them back. New links are enabled.
-
- - world: not NULL.
- - link: the link.
- - enabled: whether it takes part.
-
- Errors: INVALID_HANDLE. Threads: changes the world.
- */
-ISOCOAT_MUST_USE
-isocoat_status isocoat_link_set_enabled(struct isocoat_world *world,
-                                        struct isocoat_link link,
-                                        bool enabled);
-
-/*
- Whether a link takes part in the simulation. The links of a disabled body keep their own answer.
-
- - world: not NULL.
- - link: the link.
- - enabled: receives the answer; not NULL.
-
- Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
- */
-ISOCOAT_MUST_USE
-isocoat_status isocoat_link_is_enabled(const struct isocoat_world *world,
-                                       struct isocoat_link link,
-                                       bool *enabled);
-
-/*
- The host's own pointer of a link.
-
- - world: not NULL.
- - link: the link.
- - user_data: receives the pointer; not NULL.
-
- Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
+/**
+ * Creates a link of a body, without skeletons.
+ *
+ * - world: not NULL.
+ * - body: the body it belongs to.
+ * - desc: the link; not NULL.
+ * - link: receives the handle; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE, CAPACITY. Threads: changes the world.
  */
 ISOCOAT_MUST_USE
-isocoat_status isocoat_link_get_user_data(const struct isocoat_world *world,
-                                          struct isocoat_link link,
+isocoat_status isocoat_link_create(isocoat_world *world,
+                                   isocoat_body body,
+                                   const isocoat_link_desc *desc,
+                                   isocoat_link *link);
+
+/**
+ * Destroys a link with its skeletons.
+ *
+ * - world: not NULL.
+ * - link: the link; its handle and those of its skeletons are stale afterwards.
+ *
+ * Errors: INVALID_HANDLE. Threads: changes the world.
+ */
+ISOCOAT_MUST_USE isocoat_status isocoat_link_destroy(isocoat_world *world, isocoat_link link);
+
+/**
+ * The descriptor of a link, with its present pose and velocities.
+ *
+ * - world: not NULL.
+ * - link: the link.
+ * - desc: receives it; not NULL, with struct_size set.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_link_get_desc(const isocoat_world *world,
+                                     isocoat_link link,
+                                     isocoat_link_desc *desc);
+
+/**
+ * Changes a link, its pose and velocities included.
+ *
+ * - world: not NULL.
+ * - link: the link.
+ * - desc: the new descriptor, whole; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE, UNSUPPORTED. Threads: changes the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_link_set_desc(isocoat_world *world,
+                                     isocoat_link link,
+                                     const isocoat_link_desc *desc);
+
+/**
+ * Takes a link and its skeletons out of the simulation, or puts them back. New links are enabled.
+ *
+ * - world: not NULL.
+ * - link: the link.
+ * - enabled: whether it takes part.
+ *
+ * Errors: INVALID_HANDLE. Threads: changes the world.
+ */
+ISOCOAT_MUST_USE isocoat_status isocoat_link_set_enabled(isocoat_world *world, isocoat_link link, bool enabled);
+
+/**
+ * Whether a link takes part in the simulation. The links of a disabled body keep their own answer.
+ *
+ * - world: not NULL.
+ * - link: the link.
+ * - enabled: receives the answer; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
+ */
+ISOCOAT_MUST_USE isocoat_status isocoat_link_is_enabled(const isocoat_world *world, isocoat_link link, bool *enabled);
+
+/**
+ * The host's own pointer of a link.
+ *
+ * - world: not NULL.
+ * - link: the link.
+ * - user_data: receives the pointer; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_link_get_user_data(const isocoat_world *world,
+                                          isocoat_link link,
                                           void **user_data);
 
-/*
- The body of a link.
-
- - world: not NULL.
- - link: the link.
- - body: receives the handle; not NULL.
-
- Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
+/**
+ * The body of a link.
+ *
+ * - world: not NULL.
+ * - link: the link.
+ * - body: receives the handle; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
  */
 ISOCOAT_MUST_USE
-isocoat_status isocoat_link_get_body(const struct isocoat_world *world,
-                                     struct isocoat_link link,
-                                     struct isocoat_body *body);
+isocoat_status isocoat_link_get_body(const isocoat_world *world,
+                                     isocoat_link link,
+                                     isocoat_body *body);
 
-/*
- The skeletons of a link, in the order of their creation.
-
- - world: not NULL.
- - link: the link.
- - skeletons: receives the handles; NULL with capacity 0 asks for the count only.
- - capacity: handles that skeletons can hold.
- - count: receives the number of skeletons, also when skeletons is too small; not NULL.
-
- Errors: INVALID_HANDLE, INVALID_ARGUMENT, BUFFER_TOO_SMALL. Threads: reads the world.
+/**
+ * The skeletons of a link, in the order of their creation.
+ *
+ * - world: not NULL.
+ * - link: the link.
+ * - skeletons: receives the handles; NULL with capacity 0 asks for the count only.
+ * - capacity: handles that skeletons can hold.
+ * - count: receives the number of skeletons, also when skeletons is too small; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, BUFFER_TOO_SMALL. Threads: reads the world.
  */
 ISOCOAT_MUST_USE
-isocoat_status isocoat_link_get_skeletons(const struct isocoat_world *world,
-                                          struct isocoat_link link,
-                                          struct isocoat_skeleton *skeletons,
+isocoat_status isocoat_link_get_skeletons(const isocoat_world *world,
+                                          isocoat_link link,
+                                          isocoat_skeleton *skeletons,
                                           size_t capacity,
                                           size_t *count);
 
-/*
- Fills a descriptor with its defaults; isocoat_skeleton_desc_default() calls it.
+/* ---- Skeletons --------------------------------------------------------------------------------------------------- */
 
- - desc: receives at most size bytes, its struct_size among them; not NULL.
- - size: sizeof(isocoat_skeleton_desc) as the host was compiled.
-
- Errors: INVALID_ARGUMENT. Threads: any.
+/**
+ * Which primitive a skeleton is: an ISOCOAT_SHAPE_ value. It says what the three points of the descriptor are, all in
+ * the link's frame, in m.
  */
-isocoat_status isocoat_skeleton_desc_init(struct isocoat_skeleton_desc *desc, size_t size);
+typedef uint32_t isocoat_shape;
 
-/*
- Creates a skeleton of a link.
-
- - world: not NULL.
- - link: the link that carries it.
- - desc: the skeleton; not NULL.
- - skeleton: receives the handle; not NULL.
-
- Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE, UNSUPPORTED (a plane on a link that is not fixed), CAPACITY.
- Threads: changes the world.
+/** A point: points[0]. */
+#define ISOCOAT_SHAPE_POINT 0u
+/** A segment from points[0] to points[1]; a point if they are one. */
+#define ISOCOAT_SHAPE_SEGMENT 1u
+/** A triangle of points[0], points[1], points[2]; a segment or a point if it has no area. */
+#define ISOCOAT_SHAPE_TRIANGLE 2u
+/**
+ * A solid box: points[0] is its centre, points[1] its half extents, each > 0, points[2] the rotation of its axes as a
+ * vector (axis times angle, in rad).
  */
-ISOCOAT_MUST_USE
-isocoat_status isocoat_skeleton_create(struct isocoat_world *world,
-                                       struct isocoat_link link,
-                                       const struct isocoat_skeleton_desc *desc,
-                                       struct isocoat_skeleton *skeleton);
-
-/*
- Destroys a skeleton.
-
- - world: not NULL.
- - skeleton: the skeleton; its handle is stale afterwards.
-
- Errors: INVALID_HANDLE. Threads: changes the world.
+#define ISOCOAT_SHAPE_BOX 3u
+/**
+ * A half-space: points[0] is a point of its boundary, points[1] the outward normal, of any length but 0. For fixed links only.
  */
-ISOCOAT_MUST_USE isocoat_status isocoat_skeleton_destroy(struct isocoat_world *world, struct isocoat_skeleton skeleton);
+#define ISOCOAT_SHAPE_PLANE 4u
 
-/*
- The descriptor of a skeleton. A segment or triangle without extent comes back as the shape that it is, a plane with
- a unit normal, a box with a rotation of at most pi.
+/** A primitive fixed in a link's frame, and the field it emits. Begin with isocoat_skeleton_desc_default(). */
+typedef struct isocoat_skeleton_desc {
+    /** Size of this struct in bytes, as the host knows it. */
+    uint32_t struct_size;
+    /** Which primitive. Default ISOCOAT_SHAPE_POINT. */
+    isocoat_shape shape;
+    /** What shape says, finite; points that the shape has no use for are ignored. Default 0. */
+    double points[3][3];
+    /** Distance of the surface from an isolated skeleton, in m, > 0 and at most 1e9. Default 0.1. */
+    double thickness;
+    /**
+     * Slope of the field at the surface, in 1/m: > 0 and at most 3 isovalue / (radius - thickness); 0 stands for
+     * 2 isovalue / (radius - thickness). Default 0.
+     */
+    double stiffness;
+    /** Slope of the field at the skeleton over that at the surface: from 0 to 1e6; 1 is linear. Default 1. */
+    double stiffening;
+    /**
+     * Distance at which the field ends, in m, larger than thickness and at most 1e9; 0 stands for twice the
+     * thickness. Default 0.
+     */
+    double radius;
+    /** Number of seeds: from 4 to 65536; 0 stands for the world's. Default 0. */
+    uint32_t seed_count;
+    /** The host's own; given back, otherwise unused. Default NULL. */
+    void *user_data;
+} isocoat_skeleton_desc;
 
- - world: not NULL.
- - skeleton: the skeleton.
- - desc: receives it; not NULL, with struct_size set.
-
- Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
+/**
+ * Fills a descriptor with its defaults; isocoat_skeleton_desc_default() calls it.
+ *
+ * - desc: receives at most size bytes, its struct_size among them; not NULL.
+ * - size: sizeof(isocoat_skeleton_desc) as the host was compiled.
+ *
+ * Errors: INVALID_ARGUMENT. Threads: any.
  */
-ISOCOAT_MUST_USE
-isocoat_status isocoat_skeleton_get_desc(const struct isocoat_world *world,
-                                         struct isocoat_skeleton skeleton,
-                                         struct isocoat_skeleton_desc *desc);
+isocoat_status isocoat_skeleton_desc_init(isocoat_skeleton_desc *desc, size_t size);
 
-/*
- Changes a skeleton, from the next step or query on.
-
- - world: not NULL.
- - skeleton: the skeleton.
- - desc: the new descriptor, whole; not NULL.
-
- Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE, UNSUPPORTED. Threads: changes the world.
- */
-ISOCOAT_MUST_USE
-isocoat_status isocoat_skeleton_set_desc(struct isocoat_world *world,
-                                         struct isocoat_skeleton skeleton,
-                                         const struct isocoat_skeleton_desc *desc);
-
-/*
- Takes a skeleton out of the simulation, or puts it back. New skeletons are enabled.
-
- - world: not NULL.
- - skeleton: the skeleton.
- - enabled: whether it takes part.
-
- Errors: INVALID_HANDLE. Threads: changes the world.
+/**
+ * Creates a skeleton of a link.
+ *
+ * - world: not NULL.
+ * - link: the link that carries it.
+ * - desc: the skeleton; not NULL.
+ * - skeleton: receives the handle; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE, UNSUPPORTED (a plane on a link that is not fixed), CAPACITY.
+ * Threads: changes the world.
  */
 ISOCOAT_MUST_USE
-isocoat_status isocoat_skeleton_set_enabled(struct isocoat_world *world,
-                                            struct isocoat_skeleton skeleton,
+isocoat_status isocoat_skeleton_create(isocoat_world *world,
+                                       isocoat_link link,
+                                       const isocoat_skeleton_desc *desc,
+                                       isocoat_skeleton *skeleton);
+
+/**
+ * Destroys a skeleton.
+ *
+ * - world: not NULL.
+ * - skeleton: the skeleton; its handle is stale afterwards.
+ *
+ * Errors: INVALID_HANDLE. Threads: changes the world.
+ */
+ISOCOAT_MUST_USE isocoat_status isocoat_skeleton_destroy(isocoat_world *world, isocoat_skeleton skeleton);
+
+/**
+ * The descriptor of a skeleton. A segment or triangle without extent comes back as the shape that it is, a plane with
+ * a unit normal, a box with a rotation of at most pi.
+ *
+ * - world: not NULL.
+ * - skeleton: the skeleton.
+ * - desc: receives it; not NULL, with struct_size set.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_skeleton_get_desc(const isocoat_world *world,
+                                         isocoat_skeleton skeleton,
+                                         isocoat_skeleton_desc *desc);
+
+/**
+ * Changes a skeleton, from the next step or query on.
+ *
+ * - world: not NULL.
+ * - skeleton: the skeleton.
+ * - desc: the new descriptor, whole; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE, UNSUPPORTED. Threads: changes the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_skeleton_set_desc(isocoat_world *world,
+                                         isocoat_skeleton skeleton,
+                                         const isocoat_skeleton_desc *desc);
+
+/**
+ * Takes a skeleton out of the simulation, or puts it back. New skeletons are enabled.
+ *
+ * - world: not NULL.
+ * - skeleton: the skeleton.
+ * - enabled: whether it takes part.
+ *
+ * Errors: INVALID_HANDLE. Threads: changes the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_skeleton_set_enabled(isocoat_world *world,
+                                            isocoat_skeleton skeleton,
                                             bool enabled);
 
-/*
- Whether a skeleton takes part in the simulation. The skeletons of a disabled link keep their own answer.
-
- - world: not NULL.
- - skeleton: the skeleton.
- - enabled: receives the answer; not NULL.
-
- Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
+/**
+ * Whether a skeleton takes part in the simulation. The skeletons of a disabled link keep their own answer.
+ *
+ * - world: not NULL.
+ * - skeleton: the skeleton.
+ * - enabled: receives the answer; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
  */
 ISOCOAT_MUST_USE
-isocoat_status isocoat_skeleton_is_enabled(const struct isocoat_world *world,
-                                           struct isocoat_skeleton skeleton,
+isocoat_status isocoat_skeleton_is_enabled(const isocoat_world *world,
+                                           isocoat_skeleton skeleton,
                                            bool *enabled);
 
-/*
- The host's own pointer of a skeleton.
-
- - world: not NULL.
- - skeleton: the skeleton.
- - user_data: receives the pointer; not NULL.
-
- Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
+/**
+ * The host's own pointer of a skeleton.
+ *
+ * - world: not NULL.
+ * - skeleton: the skeleton.
+ * - user_data: receives the pointer; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
  */
 ISOCOAT_MUST_USE
-isocoat_status isocoat_skeleton_get_user_data(const struct isocoat_world *world,
-                                              struct isocoat_skeleton skeleton,
+isocoat_status isocoat_skeleton_get_user_data(const isocoat_world *world,
+                                              isocoat_skeleton skeleton,
                                               void **user_data);
 
-/*
- The link of a skeleton.
-
- - world: not NULL.
- - skeleton: the skeleton.
- - link: receives the handle; not NULL.
-
- Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
+/**
+ * The link of a skeleton.
+ *
+ * - world: not NULL.
+ * - skeleton: the skeleton.
+ * - link: receives the handle; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
  */
 ISOCOAT_MUST_USE
-isocoat_status isocoat_skeleton_get_link(const struct isocoat_world *world,
-                                         struct isocoat_skeleton skeleton,
-                                         struct isocoat_link *link);
+isocoat_status isocoat_skeleton_get_link(const isocoat_world *world,
+                                         isocoat_skeleton skeleton,
+                                         isocoat_link *link);
 
-/*
- The state of a link.
+/* ---- Motion of one link ------------------------------------------------------------------------------------------ */
 
- - world: not NULL.
- - link: the link.
- - state: receives it; not NULL.
+/** Position, orientation and velocities of a link. */
+typedef struct isocoat_link_state {
+    /** The link's frame in the world. */
+    isocoat_pose pose;
+    /** Velocity of the centre of mass in the world, in m/s, finite. */
+    double linear_velocity[3];
+    /** Angular velocity in the world, in rad/s, finite. */
+    double angular_velocity[3];
+} isocoat_link_state;
 
- Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
+/**
+ * The state of a link.
+ *
+ * - world: not NULL.
+ * - link: the link.
+ * - state: receives it; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
  */
 ISOCOAT_MUST_USE
-isocoat_status isocoat_link_get_state(const struct isocoat_world *world,
-                                      struct isocoat_link link,
-                                      struct isocoat_link_state *state);
+isocoat_status isocoat_link_get_state(const isocoat_world *world,
+                                      isocoat_link link,
+                                      isocoat_link_state *state);
 
-/*
- Sets the state of a link: every tick for a host-driven one, before the step. What differs from what the last
- impulse commanded counts as the host's own push; a jump of more than half the thinnest coat counts as a teleport.
-
- - world: not NULL.
- - link: the link.
- - state: the state; not NULL.
-
- Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE. Threads: changes the world.
- For many links at once see isocoat_world_set_link_states.
+/**
+ * Sets the state of a link: every tick for a host-driven one, before the step. What differs from what the last
+ * impulse commanded counts as the host's own push; a jump of more than half the thinnest coat counts as a teleport.
+ *
+ * - world: not NULL.
+ * - link: the link.
+ * - state: the state; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE. Threads: changes the world.
+ * For many links at once see isocoat_world_set_link_states.
  */
 ISOCOAT_MUST_USE
-isocoat_status isocoat_link_set_state(struct isocoat_world *world,
-                                      struct isocoat_link link,
-                                      const struct isocoat_link_state *state);
+isocoat_status isocoat_link_set_state(isocoat_world *world,
+                                      isocoat_link link,
+                                      const isocoat_link_state *state);
 
-/*
- Sets the state of a link and forgets its contact history: after a respawn or a restored game.
-
- - world: not NULL.
- - link: the link.
- - state: the state; not NULL.
-
- Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE. Threads: changes the world.
+/**
+ * Sets the state of a link and forgets its contact history: after a respawn or a restored game.
+ *
+ * - world: not NULL.
+ * - link: the link.
+ * - state: the state; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE. Threads: changes the world.
  */
 ISOCOAT_MUST_USE
-isocoat_status isocoat_link_teleport(struct isocoat_world *world,
-                                     struct isocoat_link link,
-                                     const struct isocoat_link_state *state);
+isocoat_status isocoat_link_teleport(isocoat_world *world,
+                                     isocoat_link link,
+                                     const isocoat_link_state *state);
 
-/*
- Mean contact force and torque on a link over the last step, about its centre of mass; 0 before the first step.
-
- - world: not NULL.
- - link: the link, of any kind.
- - wrench: receives it, in N and N m; not NULL.
-
- Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
+/**
+ * Mean contact force and torque on a link over the last step, about its centre of mass; 0 before the first step.
+ *
+ * - world: not NULL.
+ * - link: the link, of any kind.
+ * - wrench: receives it, in N and N m; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
  */
 ISOCOAT_MUST_USE
-isocoat_status isocoat_link_get_wrench(const struct isocoat_world *world,
-                                       struct isocoat_link link,
-                                       struct isocoat_wrench *wrench);
+isocoat_status isocoat_link_get_wrench(const isocoat_world *world,
+                                       isocoat_link link,
+                                       isocoat_wrench *wrench);
 
-/*
- The impulse and angular impulse that the host is to apply at the centre of mass of a host-driven link, before it
- advances it by the length of the last step. The host's own tick is then: set states, step, apply impulses, advance.
-
- - world: not NULL.
- - link: the link; 0 for kinematic links and those that the library integrates.
- - impulse: receives it, in N s and N m s; not NULL.
-
- Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
- For many links at once see isocoat_world_get_link_impulses.
+/**
+ * The impulse and angular impulse that the host is to apply at the centre of mass of a host-driven link, before it
+ * advances it by the length of the last step. The host's own tick is then: set states, step, apply impulses, advance.
+ *
+ * - world: not NULL.
+ * - link: the link; 0 for kinematic links and those that the library integrates.
+ * - impulse: receives it, in N s and N m s; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
+ * For many links at once see isocoat_world_get_link_impulses.
  */
 ISOCOAT_MUST_USE
-isocoat_status isocoat_link_get_impulse(const struct isocoat_world *world,
-                                        struct isocoat_link link,
-                                        struct isocoat_wrench *impulse);
+isocoat_status isocoat_link_get_impulse(const isocoat_world *world,
+                                        isocoat_link link,
+                                        isocoat_wrench *impulse);
 
-/*
- Adds a force for the coming step only.
-
- - world: not NULL.
- - link: a link that the library integrates (ISOCOAT_LINK_POINT_MASS, ISOCOAT_LINK_RIGID).
- - force: 3 doubles, in N, in the world, finite; not NULL.
- - point: 3 doubles, where it acts in the world, in m, finite; NULL for the centre of mass.
-
- Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE, UNSUPPORTED for other links: the host pushes its own bodies
- itself. Threads: changes the world.
-
+/**
+ * Adds a force for the coming step only.
+ *
+ * - world: not NULL.
+ * - link: a link that the library integrates (ISOCOAT_LINK_POINT_MASS, ISOCOAT_LINK_RIGID).
+ * - force: 3 doubles, in N, in the world, finite; not NULL.
+ * - point: 3 doubles, where it acts in the world, in m, finite; NULL for the centre of mass.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE, UNSUPPORTED for other links: the host pushes its own bodies
+ * itself. Threads: changes the world.
  */
 ISOCOAT_MUST_USE
-isocoat_status isocoat_link_apply_force(struct isocoat_world *world,
-                                        struct isocoat_link link,
+isocoat_status isocoat_link_apply_force(isocoat_world *world,
+                                        isocoat_link link,
                                         const double force[3],
                                         const double point[3]);
 
-/*
- Adds a torque for the coming step only.
-
- - world: not NULL.
- - link: a link that the library integrates.
- - torque: 3 doubles, in N m, in the world, finite; not NULL.
-
- Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE, UNSUPPORTED. Threads: changes the world.
-
+/**
+ * Adds a torque for the coming step only.
+ *
+ * - world: not NULL.
+ * - link: a link that the library integrates.
+ * - torque: 3 doubles, in N m, in the world, finite; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE, UNSUPPORTED. Threads: changes the world.
  */
 ISOCOAT_MUST_USE
-isocoat_status isocoat_link_apply_torque(struct isocoat_world *world,
-                                         struct isocoat_link link,
+isocoat_status isocoat_link_apply_torque(isocoat_world *world,
+                                         isocoat_link link,
                                          const double torque[3]);
 
-/*
- Adds an impulse at the start of the coming step.
-
- - world: not NULL.
- - link: a link that the library integrates.
- - impulse: 3 doubles, in N s, in the world, finite; not NULL.
- - point: 3 doubles, where it acts in the world, in m, finite; NULL for the centre of mass.
-
- Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE, UNSUPPORTED. Threads: changes the world.
-
+/**
+ * Adds an impulse at the start of the coming step.
+ *
+ * - world: not NULL.
+ * - link: a link that the library integrates.
+ * - impulse: 3 doubles, in N s, in the world, finite; not NULL.
+ * - point: 3 doubles, where it acts in the world, in m, finite; NULL for the centre of mass.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE, UNSUPPORTED. Threads: changes the world.
  */
 ISOCOAT_MUST_USE
-isocoat_status isocoat_link_apply_impulse(struct isocoat_world *world,
-                                          struct isocoat_link link,
+isocoat_status isocoat_link_apply_impulse(isocoat_world *world,
+                                          isocoat_link link,
                                           const double impulse[3],
                                           const double point[3]);
 
-/*
- Adds an angular impulse at the start of the coming step.
-
- - world: not NULL.
- - link: a link that the library integrates.
- - impulse: 3 doubles, in N m s, in the world, finite; not NULL.
-
- Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE, UNSUPPORTED. Threads: changes the world.
-
+/**
+ * Adds an angular impulse at the start of the coming step.
+ *
+ * - world: not NULL.
+ * - link: a link that the library integrates.
+ * - impulse: 3 doubles, in N m s, in the world, finite; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE, UNSUPPORTED. Threads: changes the world.
  */
 ISOCOAT_MUST_USE
-isocoat_status isocoat_link_apply_angular_impulse(struct isocoat_world *world,
-                                                  struct isocoat_link link,
+isocoat_status isocoat_link_apply_angular_impulse(isocoat_world *world,
+                                                  isocoat_link link,
                                                   const double impulse[3]);
 
-/*
- Sets the accelerations of a link besides gravity and contact, until they are set again: for a host-driven link, what
- the host adds by itself in a tick besides gravity_scale times the world's gravity.
-
- - world: not NULL.
- - link: the link.
- - linear: 3 doubles, in m/s^2, in the world, finite; not NULL.
- - angular: 3 doubles, in rad/s^2, in the world, finite; not NULL.
-
- Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE. Threads: changes the world.
-
+/**
+ * Sets the accelerations of a link besides gravity and contact, until they are set again: for a host-driven link, what
+ * the host adds by itself in a tick besides gravity_scale times the world's gravity.
+ *
+ * - world: not NULL.
+ * - link: the link.
+ * - linear: 3 doubles, in m/s^2, in the world, finite; not NULL.
+ * - angular: 3 doubles, in rad/s^2, in the world, finite; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE. Threads: changes the world.
  */
 ISOCOAT_MUST_USE
-isocoat_status isocoat_link_set_external_acceleration(struct isocoat_world *world,
-                                                      struct isocoat_link link,
+isocoat_status isocoat_link_set_external_acceleration(isocoat_world *world,
+                                                      isocoat_link link,
                                                       const double linear[3],
                                                       const double angular[3]);
 
-/*
- Sets the states of many links, as isocoat_link_set_state does: all of them, or none if one is refused.
+/* ---- Bulk calls -------------------------------------------------------------------------------------------------- */
 
- - world: not NULL.
- - links: count handles; not NULL unless count is 0. Of a link that is named twice, the last state holds.
- - states: count states; not NULL unless count is 0.
- - count: number of links.
+/** Number type of a buffer: an ISOCOAT_FORMAT_ value. */
+typedef uint32_t isocoat_format;
 
- Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE; the message says which element. Threads: changes the world.
+/** Numbers are double. */
+#define ISOCOAT_FORMAT_F64 0u
+/** Numbers are float, rounded to nearest. */
+#define ISOCOAT_FORMAT_F32 1u
+
+/**
+ * Where a bulk call writes: elements of 3 or 4 numbers in the host's own memory, such as a field of its own structs.
+ */
+typedef struct isocoat_buffer {
+    /** First number of the first element; NULL when this result is not wanted. */
+    void *data;
+    /** Bytes from one element to the next: at least the size of an element, or 0 for elements without gaps. */
+    size_t stride;
+    /** Number type. */
+    isocoat_format format;
+} isocoat_buffer;
+
+/**
+ * Sets the states of many links, as isocoat_link_set_state does: all of them, or none if one is refused.
+ *
+ * - world: not NULL.
+ * - links: count handles; not NULL unless count is 0. Of a link that is named twice, the last state holds.
+ * - states: count states; not NULL unless count is 0.
+ * - count: number of links.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE; the message says which element. Threads: changes the world.
  */
 ISOCOAT_MUST_USE
-isocoat_status isocoat_world_set_link_states(struct isocoat_world *world,
-                                             const struct isocoat_link *links,
-                                             const struct isocoat_link_state *states,
+isocoat_status isocoat_world_set_link_states(isocoat_world *world,
+                                             const isocoat_link *links,
+                                             const isocoat_link_state *states,
                                              size_t count);
 
-/*
- Positions and orientations of many links.
-
- - world: not NULL.
- - links: count handles; not NULL unless count is 0.
- - count: number of links.
- - positions: receives 3 numbers a link, in m; skipped if its data is NULL.
- - orientations: receives 4 numbers a link, a quaternion x, y, z, w; skipped if its data is NULL.
-
- Errors: INVALID_HANDLE, INVALID_ARGUMENT; nothing is written then. Threads: reads the world.
+/**
+ * Positions and orientations of many links.
+ *
+ * - world: not NULL.
+ * - links: count handles; not NULL unless count is 0.
+ * - count: number of links.
+ * - positions: receives 3 numbers a link, in m; skipped if its data is NULL.
+ * - orientations: receives 4 numbers a link, a quaternion x, y, z, w; skipped if its data is NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT; nothing is written then. Threads: reads the world.
  */
 ISOCOAT_MUST_USE
-isocoat_status isocoat_world_get_link_states(const struct isocoat_world *world,
-                                             const struct isocoat_link *links,
+isocoat_status isocoat_world_get_link_states(const isocoat_world *world,
+                                             const isocoat_link *links,
                                              size_t count,
-                                             struct isocoat_buffer positions,
-                                             struct isocoat_buffer orientations);
+                                             isocoat_buffer positions,
+                                             isocoat_buffer orientations);
 
-/*
- Mean contact forces and torques on many links over the last step, as isocoat_link_get_wrench gives them.
-
- - world: not NULL.
- - links: count handles; not NULL unless count is 0.
- - count: number of links.
- - linear: receives 3 numbers a link, the force in N; skipped if its data is NULL.
- - angular: receives 3 numbers a link, the torque about the centre of mass in N m; skipped if its data is NULL.
-
- Errors: INVALID_HANDLE, INVALID_ARGUMENT; nothing is written then. Threads: reads the world.
+/**
+ * Mean contact forces and torques on many links over the last step, as isocoat_link_get_wrench gives them.
+ *
+ * - world: not NULL.
+ * - links: count handles; not NULL unless count is 0.
+ * - count: number of links.
+ * - linear: receives 3 numbers a link, the force in N; skipped if its data is NULL.
+ * - angular: receives 3 numbers a link, the torque about the centre of mass in N m; skipped if its data is NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT; nothing is written then. Threads: reads the world.
  */
 ISOCOAT_MUST_USE
-isocoat_status isocoat_world_get_link_wrenches(const struct isocoat_world *world,
-                                               const struct isocoat_link *links,
+isocoat_status isocoat_world_get_link_wrenches(const isocoat_world *world,
+                                               const isocoat_link *links,
                                                size_t count,
-                                               struct isocoat_buffer linear,
-                                               struct isocoat_buffer angular);
+                                               isocoat_buffer linear,
+                                               isocoat_buffer angular);
 
-/*
- The impulses that the host is to apply to many host-driven links, as isocoat_link_get_impulse gives them.
-
- - world: not NULL.
- - links: count handles; not NULL unless count is 0.
- - count: number of links.
- - linear: receives 3 numbers a link, the impulse in N s; skipped if its data is NULL.
- - angular: receives 3 numbers a link, the angular impulse in N m s; skipped if its data is NULL.
-
- Errors: INVALID_HANDLE, INVALID_ARGUMENT; nothing is written then. Threads: reads the world.
+/**
+ * The impulses that the host is to apply to many host-driven links, as isocoat_link_get_impulse gives them.
+ *
+ * - world: not NULL.
+ * - links: count handles; not NULL unless count is 0.
+ * - count: number of links.
+ * - linear: receives 3 numbers a link, the impulse in N s; skipped if its data is NULL.
+ * - angular: receives 3 numbers a link, the angular impulse in N m s; skipped if its data is NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT; nothing is written then. Threads: reads the world.
  */
 ISOCOAT_MUST_USE
-isocoat_status isocoat_world_get_link_impulses(const struct isocoat_world *world,
-                                               const struct isocoat_link *links,
+isocoat_status isocoat_world_get_link_impulses(const isocoat_world *world,
+                                               const isocoat_link *links,
                                                size_t count,
-                                               struct isocoat_buffer linear,
-                                               struct isocoat_buffer angular);
+                                               isocoat_buffer linear,
+                                               isocoat_buffer angular);
 
-/*
- Fills counters with zeros and their size; isocoat_counters_default() calls it.
+/* ---- What a step reports ----------------------------------------------------------------------------------------- */
 
- - counters: receives at most size bytes, its struct_size among them; not NULL.
- - size: sizeof(isocoat_counters) as the host was compiled.
+/** Figures of the last step. Begin with isocoat_counters_default(). */
+typedef struct isocoat_counters {
+    /** Size of this struct in bytes, as the host knows it. */
+    uint32_t struct_size;
+    /** Live bodies. */
+    uint32_t bodies;
+    /** Live links. */
+    uint32_t links;
+    /** Live skeletons. */
+    uint32_t skeletons;
+    /** Pairs of bodies whose bounds met. */
+    uint32_t pairs;
+    /** Groups of bodies that were stepped together. */
+    uint32_t islands;
+    /** Sub-steps of the group that took the most. */
+    uint32_t substeps;
+    /** Pieces of contact surface at the end of the step. */
+    uint32_t patches;
+    /** Evaluations of a pair of fields. */
+    uint64_t evaluations;
+} isocoat_counters;
 
- Errors: INVALID_ARGUMENT. Threads: any.
+/** One connected piece of contact surface between two coats. */
+typedef struct isocoat_contact {
+    /** The first body. */
+    isocoat_body body_a;
+    /** The second body. */
+    isocoat_body body_b;
+    /** The link of the first body whose field is the highest at the deepest point. */
+    isocoat_link link_a;
+    /** The same of the second. */
+    isocoat_link link_b;
+    /** The skeleton of the first body whose territory holds the deepest point. */
+    isocoat_skeleton skeleton_a;
+    /** The same of the second. */
+    isocoat_skeleton skeleton_b;
+    /** Centre of pressure, in m. */
+    double position[3];
+    /** Mean normal, from a to b. */
+    double normal[3];
+    /** Force on b, in N; a has the opposite. */
+    double force[3];
+    /** Torque on b about position, in N m; a has the opposite. */
+    double torque[3];
+    /** Area of the surface, in m^2. */
+    double area;
+    /** Highest pressure, in Pa. */
+    double peak_pressure;
+    /** Normal stiffness, in N/m: the integral of g_a g_b / (g_a + g_b) over the surface. */
+    double stiffness;
+    /** Estimated relative error of the elastic force. */
+    double error_estimate;
+    /** How often the two fields were evaluated. */
+    uint32_t evaluations;
+    /** The scheme that integrated it. */
+    isocoat_scheme scheme;
+    /** 1 if the load is past the most that this contact can carry, else 0. */
+    uint32_t overloaded;
+    /** 0. */
+    uint32_t reserved;
+} isocoat_contact;
+
+/** What happened to a pair of bodies: an ISOCOAT_EVENT_ value. More may come. */
+typedef uint32_t isocoat_event_kind;
+
+/** The coats began to touch. */
+#define ISOCOAT_EVENT_BEGIN 0u
+/** The coats stopped touching. */
+#define ISOCOAT_EVENT_END 1u
+/** The contact went past the most it can carry. */
+#define ISOCOAT_EVENT_OVERLOAD 2u
+
+/** A change between two bodies in the last step. */
+typedef struct isocoat_event {
+    /** What happened. */
+    isocoat_event_kind kind;
+    /** 0. */
+    uint32_t reserved;
+    /** The first body; it may have been destroyed since. */
+    isocoat_body body_a;
+    /** The second body; it may have been destroyed since. */
+    isocoat_body body_b;
+} isocoat_event;
+
+/**
+ * Fills counters with zeros and their size; isocoat_counters_default() calls it.
+ *
+ * - counters: receives at most size bytes, its struct_size among them; not NULL.
+ * - size: sizeof(isocoat_counters) as the host was compiled.
+ *
+ * Errors: INVALID_ARGUMENT. Threads: any.
  */
-isocoat_status isocoat_counters_init(struct isocoat_counters *counters, size_t size);
+isocoat_status isocoat_counters_init(isocoat_counters *counters, size_t size);
 
-/*
- The contacts of the last step; of a sub-stepped one, as they were in its last sub-step.
-
- - world: not NULL.
- - contacts: receives a pointer to them (not to be freed); not NULL.
- - count: receives their number; not NULL.
-
- Errors: INVALID_ARGUMENT. Threads: reads the world. Lifetime: until the next step or destroy of the world.
+/**
+ * The contacts of the last step; of a sub-stepped one, as they were in its last sub-step.
+ *
+ * - world: not NULL.
+ * - contacts: receives a pointer to them (not to be freed); not NULL.
+ * - count: receives their number; not NULL.
+ *
+ * Errors: INVALID_ARGUMENT. Threads: reads the world. Lifetime: until the next step or destroy of the world.
  */
 ISOCOAT_MUST_USE
-isocoat_status isocoat_world_get_contacts(const struct isocoat_world *world,
-                                          const struct isocoat_contact **contacts,
+isocoat_status isocoat_world_get_contacts(const isocoat_world *world,
+                                          const isocoat_contact **contacts,
                                           size_t *count);
 
-/*
- What began, ended or was overloaded in the last step.
-
- - world: not NULL.
- - events: receives a pointer to them (not to be freed); not NULL.
- - count: receives their number; not NULL.
-
- Errors: INVALID_ARGUMENT. Threads: reads the world. Lifetime: until the next step or destroy of the world.
+/**
+ * What began, ended or was overloaded in the last step.
+ *
+ * - world: not NULL.
+ * - events: receives a pointer to them (not to be freed); not NULL.
+ * - count: receives their number; not NULL.
+ *
+ * Errors: INVALID_ARGUMENT. Threads: reads the world. Lifetime: until the next step or destroy of the world.
  */
 ISOCOAT_MUST_USE
-isocoat_status isocoat_world_get_events(const struct isocoat_world *world,
-                                        const struct isocoat_event **events,
+isocoat_status isocoat_world_get_events(const isocoat_world *world,
+                                        const isocoat_event **events,
                                         size_t *count);
 
-/*
- Figures of the last step, and how many objects live now.
-
- - world: not NULL.
- - counters: receives them; not NULL, with struct_size set.
-
- Errors: INVALID_ARGUMENT. Threads: reads the world.
+/**
+ * Figures of the last step, and how many objects live now.
+ *
+ * - world: not NULL.
+ * - counters: receives them; not NULL, with struct_size set.
+ *
+ * Errors: INVALID_ARGUMENT. Threads: reads the world.
  */
 ISOCOAT_MUST_USE
-isocoat_status isocoat_world_get_counters(const struct isocoat_world *world,
-                                          struct isocoat_counters *counters);
+isocoat_status isocoat_world_get_counters(const isocoat_world *world,
+                                          isocoat_counters *counters);
+
+/* ---- Queries ----------------------------------------------------------------------------------------------------- */
+
+/** Where a ray meets a coat. */
+typedef struct isocoat_ray_hit {
+    /** The body. */
+    isocoat_body body;
+    /** The link that carries the skeleton. */
+    isocoat_link link;
+    /** The skeleton in whose territory the point lies. */
+    isocoat_skeleton skeleton;
+    /** Length of the ray up to the point, in m; 0 for a ray that starts inside. */
+    double distance;
+    /** The point, in m. */
+    double position[3];
+    /** Outward unit normal of the coat. */
+    double normal[3];
+} isocoat_ray_hit;
+
+/** A point of a coat's surface. */
+typedef struct isocoat_surface_point {
+    /** The point, in m. */
+    double position[3];
+    /** Outward unit normal of the coat. */
+    double normal[3];
+    /** Distance of the point that was asked about, in m; negative inside the coat. */
+    double distance;
+    /** The link that carries the skeleton. */
+    isocoat_link link;
+    /** The skeleton in whose territory the point lies. */
+    isocoat_skeleton skeleton;
+} isocoat_surface_point;
+
+/**
+ * The field of a body at points of the world: f = sum of F(distance) over its skeletons. The surface is where f equals
+ * the body's isovalue; inside, f is larger.
+ *
+ * - world: not NULL.
+ * - body: the body.
+ * - points: 3 * count doubles, in m, finite; not NULL unless count is 0.
+ * - count: number of points.
+ * - values: receives count doubles; NULL if not wanted. Must not overlap points or gradients.
+ * - gradients: receives 3 * count doubles, the gradients in the world's axes, in 1/m; NULL if not wanted. Must not
+ *   overlap points.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE. Threads: reads the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_body_evaluate_field(const isocoat_world *world,
+                                           isocoat_body body,
+                                           const double *points,
+                                           size_t count,
+                                           double *values,
+                                           double *gradients);
+
+/**
+ * The contacts that two bodies would have at their present poses. Changes nothing, and asks neither categories nor the
+ * pair filter.
+ *
+ * - world: not NULL.
+ * - body_a, body_b: two different bodies.
+ * - scheme: how to integrate, an ISOCOAT_SCHEME_ value.
+ * - tolerance: relative error accepted in the force, from 1e-9 to 0.5.
+ * - contacts: receives the contacts; NULL with capacity 0 asks for the count only.
+ * - capacity: contacts that fit.
+ * - count: receives the number of contacts, also when contacts is too small; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE, UNSUPPORTED, BUFFER_TOO_SMALL. Threads: reads the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_world_collide(const isocoat_world *world,
+                                     isocoat_body body_a,
+                                     isocoat_body body_b,
+                                     isocoat_scheme scheme,
+                                     double tolerance,
+                                     isocoat_contact *contacts,
+                                     size_t capacity,
+                                     size_t *count);
+
+/**
+ * The first coat that a ray meets, among enabled bodies.
+ *
+ * - world: not NULL.
+ * - origin: 3 doubles, in m, finite; not NULL. A ray that starts inside a coat meets it at distance 0.
+ * - direction: 3 doubles, of any length but 0, finite; not NULL.
+ * - max_distance: length of the ray, in m, at least 0; may be infinite.
+ * - mask: bodies whose category has a bit of it are looked at.
+ * - hit: receives where it meets, if it does; not NULL.
+ * - found: receives whether it meets a coat; not NULL.
+ *
+ * Errors: INVALID_ARGUMENT, OUT_OF_RANGE. Threads: reads the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_world_cast_ray(const isocoat_world *world,
+                                      const double origin[3],
+                                      const double direction[3],
+                                      double max_distance,
+                                      uint64_t mask,
+                                      isocoat_ray_hit *hit,
+                                      bool *found);
+
+/**
+ * The enabled bodies whose coat comes within a distance of a point, in the order of their handles.
+ *
+ * - world: not NULL.
+ * - center: 3 doubles, in m, finite; not NULL.
+ * - radius: the distance, in m, at least 0; 0 finds the coats that contain the point.
+ * - mask: bodies whose category has a bit of it are looked at.
+ * - bodies: receives the handles; NULL with capacity 0 asks for the count only.
+ * - capacity: handles that fit.
+ * - count: receives the number of bodies, also when bodies is too small; not NULL.
+ *
+ * Errors: INVALID_ARGUMENT, OUT_OF_RANGE, BUFFER_TOO_SMALL. Threads: reads the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_world_overlap_sphere(const isocoat_world *world,
+                                            const double center[3],
+                                            double radius,
+                                            uint64_t mask,
+                                            isocoat_body *bodies,
+                                            size_t capacity,
+                                            size_t *count);
+
+/**
+ * The point of a body's surface that is closest to a point of the world.
+ *
+ * - world: not NULL.
+ * - body: the body; it may be disabled.
+ * - point: 3 doubles, in m, finite; not NULL. It may be inside.
+ * - closest: receives the closest point, if there is one; not NULL.
+ * - found: receives whether there is one: not for a body without enabled skeletons; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE. Threads: reads the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_body_closest_point(const isocoat_world *world,
+                                          isocoat_body body,
+                                          const double point[3],
+                                          isocoat_surface_point *closest,
+                                          bool *found);
+
+/**
+ * The seeds of a skeleton, always in the same order: samples sent out from it until they meet the surface, or the
+ * territory of another skeleton.
+ *
+ * - world: not NULL.
+ * - skeleton: the skeleton; a plane has none, nor has a disabled skeleton or link.
+ * - positions: receives 3 numbers a seed, in m; skipped if its data is NULL.
+ * - normals: receives 3 numbers a seed, the outward unit normal of the field; skipped if its data is NULL.
+ * - valid: receives 1 for a seed on the surface, 0 for one that met another territory; NULL if not wanted.
+ * - capacity: seeds that fit into each of the three. With all three NULL only the count is asked.
+ * - count: receives the number of seeds, also when they do not fit; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, BUFFER_TOO_SMALL. Threads: reads the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_skeleton_get_seeds(const isocoat_world *world,
+                                          isocoat_skeleton skeleton,
+                                          isocoat_buffer positions,
+                                          isocoat_buffer normals,
+                                          uint8_t *valid,
+                                          size_t capacity,
+                                          size_t *count);
+
+/* ---- Debug drawing ----------------------------------------------------------------------------------------------- */
+
+/** What to draw: ISOCOAT_DRAW_ flags, added up. */
+typedef uint32_t isocoat_draw_flags;
+
+/** Skeletons as points and wires. */
+#define ISOCOAT_DRAW_SKELETONS 1u
+/** Seeds as points with normals. */
+#define ISOCOAT_DRAW_SEEDS 2u
+/** The contacts of the last step: their forces, and discs of their areas. */
+#define ISOCOAT_DRAW_CONTACTS 4u
+/** The box that bounds the field of each body. */
+#define ISOCOAT_DRAW_BOUNDS 8u
+
+/**
+ * Draws a line.
+ *
+ * - context: as in isocoat_debug_draw.
+ * - a, b: 3 doubles each, its ends in the world, in m; valid during the call.
+ * - color: 0xRRGGBBAA.
+ *
+ * It must return (no longjmp, no exception). It may read the world, but not change it.
+ */
+typedef void (*isocoat_draw_line_fn)(void *context, const double *a, const double *b, uint32_t color);
+
+/**
+ * Draws a point.
+ *
+ * - context: as in isocoat_debug_draw.
+ * - position: 3 doubles, in the world, in m; valid during the call.
+ * - size: the diameter it should have in the scene, in m.
+ * - color: 0xRRGGBBAA.
+ *
+ * It must return (no longjmp, no exception). It may read the world, but not change it.
+ */
+typedef void (*isocoat_draw_point_fn)(void *context, const double *position, double size, uint32_t color);
+
+/** What to draw and how. Begin with isocoat_debug_draw_default(). */
+typedef struct isocoat_debug_draw {
+    /** Size of this struct in bytes, as the host knows it. */
+    uint32_t struct_size;
+    /** ISOCOAT_DRAW_ flags, added up. Default 0, which draws nothing. */
+    isocoat_draw_flags flags;
+    /** Given to the functions, otherwise unused. Default NULL. */
+    void *context;
+    /** Draws a line; NULL leaves lines out. Default NULL. */
+    isocoat_draw_line_fn draw_line;
+    /** Draws a point; NULL leaves points out. Default NULL. */
+    isocoat_draw_point_fn draw_point;
+} isocoat_debug_draw;
+
+/**
+ * Fills a description of what to draw with its defaults; isocoat_debug_draw_default() calls it.
+ *
+ * - draw: receives at most size bytes, its struct_size among them; not NULL.
+ * - size: sizeof(isocoat_debug_draw) as the host was compiled.
+ *
+ * Errors: INVALID_ARGUMENT. Threads: any.
+ */
+isocoat_status isocoat_debug_draw_init(isocoat_debug_draw *draw, size_t size);
+
+/**
+ * Draws what a world sees: its enabled bodies at their present poses.
+ *
+ * - world: not NULL.
+ * - draw: what and how; not NULL. Its functions are called before this returns, on this thread.
+ *
+ * Errors: INVALID_ARGUMENT. Threads: reads the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_world_debug_draw(const isocoat_world *world,
+                                        const isocoat_debug_draw *draw);
 
 #ifdef __cplusplus
-}  // extern "C"
-#endif  // __cplusplus
-
-#endif  /* ISOCOAT_H */
+}
+#endif
 
 /* Descriptors with every field at its default, and the size that this header knows. */
 
@@ -1693,6 +1606,13 @@ static inline isocoat_counters isocoat_counters_default(void)
     return counters;
 }
 
+static inline isocoat_debug_draw isocoat_debug_draw_default(void)
+{
+    isocoat_debug_draw draw;
+    isocoat_debug_draw_init(&draw, sizeof draw);
+    return draw;
+}
+
 /*
  * Compares what this header says with the library that runs: version, and the size of every struct. Call it once at
  * the start. Errors: UNSUPPORTED when they do not fit together; isocoat_last_error tells why.
@@ -1712,6 +1632,11 @@ ISOCOAT_MUST_USE static inline isocoat_status isocoat_check_abi(void)
         (uint32_t)sizeof(isocoat_body_desc),
         (uint32_t)sizeof(isocoat_link_desc),
         (uint32_t)sizeof(isocoat_skeleton_desc),
+        (uint32_t)sizeof(isocoat_ray_hit),
+        (uint32_t)sizeof(isocoat_surface_point),
+        (uint32_t)sizeof(isocoat_debug_draw),
     };
     return isocoat_check_abi_of(ISOCOAT_VERSION, sizes, sizeof sizes / sizeof sizes[0]);
 }
+
+#endif /* ISOCOAT_H */

@@ -1,6 +1,5 @@
 //! Handles: ids by value, one type a noun.
 
-use crate::world::arena::RawId;
 use crate::world::{BodyId, LinkId, SkeletonId};
 
 /// Handle of a body: one deformable or rigid object. All zero is null. A handle whose body was destroyed, or of
@@ -44,7 +43,9 @@ macro_rules! converts {
     ($handle:ty, $id:ty) => {
         impl From<$handle> for $id {
             fn from(handle: $handle) -> Self {
-                Self::from_raw(RawId { index: handle.index, generation: handle.generation, world: handle.world })
+                let mut id = Self::default();
+                (id.raw.index, id.raw.generation, id.raw.world) = (handle.index, handle.generation, handle.world);
+                id
             }
         }
         impl From<$id> for $handle {

@@ -58,9 +58,7 @@ impl<T: Copy> Array<T> {
         if count > 0 {
             not_null(first, name)?;
         }
-        if count.checked_mul(size_of::<T>()).is_none_or(|bytes| bytes > isize::MAX as usize) {
-            return Err(Refusal::argument(format!("the count of {name} is {count}: no memory is that large")));
-        }
+        check_count::<T>(count, name)?;
         Ok(Self { first, count })
     }
 
@@ -68,6 +66,68 @@ impl<T: Copy> Array<T> {
         // SAFETY: `index` is below the count that was promised to `new`.
         (0..self.count).map(move |index| unsafe { self.first.add(index).read_unaligned() })
     }
+}
+
+/// An array that is used in place, so that it must be aligned.
+///
+/// # Safety
+/// `first` is NULL, or `count` elements can be read from there until the call returns, nobody changes them, and every
+/// bit pattern is a value of `T`.
+pub(super) unsafe fn slice<'a, T>(first: *const T, count: usize, name: &str) -> Checked<&'a [T]> {
+    Ok(match in_place(first, count, name)? {
+        // SAFETY: checked for NULL, size and alignment; the rest is the caller's promise.
+        true => unsafe { std::slice::from_raw_parts(first, count) },
+        false => &[],
+    })
+}
+
+/// An array that is written in place, so that it must be aligned; `None` if it is NULL.
+///
+/// # Safety
+/// `first` is NULL, or `count` elements can be written there until the call returns, nobody else uses them, and every
+/// bit pattern is a value of `T`.
+pub(super) unsafe fn slice_mut<'a, T>(first: *mut T, count: usize, name: &str) -> Checked<Option<&'a mut [T]>> {
+    if first.is_null() {
+        return Ok(None);
+    }
+    Ok(Some(match in_place(first, count, name)? {
+        // SAFETY: checked for NULL, size and alignment; the rest is the caller's promise.
+        true => unsafe { std::slice::from_raw_parts_mut(first, count) },
+        false => &mut [],
+    }))
+}
+
+/// Whether there is anything at `first`.
+fn in_place<T>(first: *const T, count: usize, name: &str) -> Checked<bool> {
+    if count == 0 {
+        return Ok(false);
+    }
+    not_null(first, name)?;
+    check_count::<T>(count, name)?;
+    if first.is_aligned() {
+        return Ok(true);
+    }
+    Err(Refusal::argument(format!("{name} is not aligned to {} bytes", align_of::<T>())))
+}
+
+/// Refuses arrays that share memory.
+pub(super) fn disjoint(arrays: [(&str, *const f64, usize); 3]) -> Checked<()> {
+    let end = |(_, first, count): &(&str, *const f64, usize)| first.wrapping_add(*count);
+    for (index, a) in arrays.iter().enumerate() {
+        for b in &arrays[index + 1..] {
+            if !a.1.is_null() && !b.1.is_null() && a.1 < end(b) && b.1 < end(a) {
+                return Err(Refusal::argument(format!("{} and {} overlap", a.0, b.0)));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn check_count<T>(count: usize, name: &str) -> Checked<()> {
+    if count.checked_mul(size_of::<T>()).is_some_and(|bytes| bytes <= isize::MAX as usize) {
+        return Ok(());
+    }
+    Err(Refusal::argument(format!("the count of {name} is {count}: no memory is that large")))
 }
 
 /// A buffer for a number of results that the host may ask for first.

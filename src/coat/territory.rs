@@ -2,8 +2,8 @@
 //! sample its share of the surface.
 //!
 //! A seed goes out from its skeleton along its ray, until it meets the coat's surface or the territory of another
-//! skeleton \[97, section 5.1\]. Where two fields are equal, the territory is that of the skeleton that comes first, as in
-//! [`blend::territory`](crate::field::blend::territory).
+//! skeleton \[97, section 5.1\]. Where two fields are equal, the territory belongs to the skeleton that comes first, as
+//! in [`blend::territory`](crate::field::blend::territory), within a tolerance that keeps rounding out of it.
 //!
 //! Seeds move only when the links of a body move relative to each other, so a root need not be fast: it is found from
 //! a bracket that depends on the coat alone, never on where the seed was before. The same coat gives the same bits,
@@ -59,6 +59,20 @@ pub fn neighbours(skeletons: &[Placed], index: usize, out: &mut Vec<usize>) {
 /// whole region, where rounding must not decide.
 const TIE: f64 = 1e-10;
 
+/// How far the field `own` of skeleton `index` is ahead of another's, and so much more or less that ties go to the
+/// skeleton that comes first.
+fn ahead_of(own: f64, value: f64, index: usize, other: usize, isovalue: f64) -> f64 {
+    let tie = TIE * isovalue;
+    own - value + if index < other { tie } else { -tie }
+}
+
+/// Whether a point lies in the territory of skeleton `index` \[97, eq. (21)\], ties settled as everywhere here.
+pub fn owns(skeletons: &[Placed], isovalue: f64, index: usize, p: &Vec3) -> bool {
+    let own = skeletons[index].value(p);
+    let mut others = skeletons.iter().enumerate().filter(|(other, _)| *other != index);
+    others.all(|(other, skeleton)| ahead_of(own, skeleton.value(p), index, other, isovalue) >= 0.0)
+}
+
 /// Follows a ray of skeleton `index` from its foot, in the frame of the coat. Gives the distance \[m\] and what the ray
 /// ran into.
 ///
@@ -82,14 +96,16 @@ pub fn follow(coat: &Coat, index: usize, neighbours: &[usize], ray: &Ray) -> (f6
         // No other field is negative, so the surface lies at the thickness or beyond: a node of the walk.
         let next = (r + stride).min(if r < thickness { thickness } else { radius });
         let ahead = look(next);
-        let surface = (ahead.excess < 0.0 && next > thickness)
-            .then(|| bracketed(r, next, view.excess, ahead.excess, |x| look(x).excess));
         let border = (ahead.lead < 0.0).then(|| bracketed(r, next, view.lead, ahead.lead, |x| look(x).lead));
-        match (surface, border) {
-            (Some(surface), border) if border.is_none_or(|border| surface <= border) => return (surface, End::Surface),
-            (_, Some(border)) => return (border, End::Territory(ahead.rival)),
-            _ => (r, view) = (next, ahead),
+        // A ray may leave the solid just before it enters another territory: the surface then comes first.
+        let (end, at_end) = border.map_or((next, ahead.excess), |border| (border, look(border).excess));
+        if at_end < 0.0 && end > thickness {
+            return (bracketed(r, end, view.excess, at_end, |x| look(x).excess), End::Surface);
         }
+        if let Some(border) = border {
+            return (border, End::Territory(ahead.rival));
+        }
+        (r, view) = (next, ahead);
     }
     // The own field ends here: whatever is still above the isovalue is another territory.
     (radius, End::Territory(view.rival))
@@ -99,7 +115,7 @@ pub fn follow(coat: &Coat, index: usize, neighbours: &[usize], ray: &Ray) -> (f6
 struct View {
     /// Field of all skeletons less the isovalue.
     excess: f64,
-    /// Own field less the highest of the others, and so much less or more that ties go to the first in the body.
+    /// How far the own field is ahead of the highest of the others, see [`ahead_of`].
     lead: f64,
     /// The skeleton whose field is the highest of the others.
     rival: usize,
@@ -108,12 +124,11 @@ struct View {
 impl View {
     fn at(coat: &Coat, index: usize, neighbours: &[usize], p: &Vec3) -> Self {
         let own = coat.skeletons[index].value(p);
-        let tie = TIE * coat.isovalue;
         let (mut sum, mut lead, mut rival) = (own, f64::INFINITY, index);
         for &other in neighbours {
             let value = coat.skeletons[other].value(p);
             sum += value;
-            let ahead = own - value + if index < other { tie } else { -tie };
+            let ahead = ahead_of(own, value, index, other, coat.isovalue);
             if ahead < lead {
                 (lead, rival) = (ahead, other);
             }

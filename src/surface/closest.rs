@@ -1,8 +1,8 @@
 //! The point of a coat's surface that is closest to a given point.
 //!
-//! Where only one field reaches, the answer is a closed form. Where several blend, every skeleton in reach (and, from
-//! the inside, a fan of directions) gives a start on the surface, from which Newton's method on the distance along the
-//! surface goes down to a local minimum; the lowest one wins.
+//! Where only one field reaches, the answer is a closed form. Where several blend, rays from the point (towards each
+//! skeleton in reach, or outwards) give starts on the surface, from which Newton's method on the distance along the
+//! surface goes down to a local minimum; the lowest one wins, after one more look round it.
 
 use super::SurfaceHit;
 use super::ray::cast;
@@ -16,45 +16,45 @@ use crate::math::{Vec3, tangents};
 ///
 /// The sign of the distance is that of the solid: negative where the field is at least the isovalue. The position is
 /// exact to rounding where a single field reaches and a root of the stationarity condition `(x - p) ∥ ∇f` elsewhere. A
-/// blend has no closed form: the search could miss the closest of several dents that no skeleton points at.
+/// blend has no closed form: the search could miss the closest of several dents or bulges that none of its rays meets.
 pub fn closest(coat: &Coat, p: &Vec3) -> Option<SurfaceHit> {
     let depth = |skeleton: &Placed| skeleton.shape.closest(p).distance - skeleton.profile.thickness;
     let depths: Vec<f64> = coat.skeletons.iter().map(depth).collect();
     let nearest = (0..depths.len()).min_by(|a, b| depths[*a].total_cmp(&depths[*b]))?;
     let inside = coat.excess(p) >= 0.0;
-    // The isolated surface of the nearest skeleton lies in the solid, or on its surface: none is further away outside.
     let alone = on_isolated(&coat.skeletons[nearest], p);
-    let mut near = subset(coat, p, depths[nearest].abs());
-    let position = if near.skeletons.len() <= 1 {
+    let position = if subset(coat, p, depths[nearest].abs()).skeletons.len() <= 1 {
         alone
-    } else if inside {
-        let exits: Vec<Vec3> = directions(&near, p).filter_map(|u| exit(coat, p, &u)).collect();
-        let distance = exits.iter().map(|x| (x - p).norm()).fold(f64::INFINITY, f64::min);
-        if distance == f64::INFINITY {
-            return None;
-        }
-        // Room for starts that slide closer than the best of them.
-        near = subset(coat, p, 2.0 * distance);
-        let starts = exits.into_iter().filter(|x| (x - p).norm() <= 2.0 * distance);
-        let found = lowest(&near, p, starts)?;
-        let toward_others = directions(&near, p).filter_map(|u| exit(&near, p, &u));
-        lowest(&near, p, toward_others.filter(|x| (x - p).norm() <= 2.0 * distance).chain([found]))?
     } else {
-        let limit = (alone - p).norm();
-        let first = near.skeletons.iter().map(|skeleton| on_isolated(skeleton, p));
-        let between = near.skeletons.iter().map(|skeleton| (on_isolated(skeleton, p) + alone) * 0.5);
-        let targets: Vec<Vec3> = first.chain(between).collect();
-        let starts = targets.iter().filter_map(|x| {
-            let direction = (x - p).try_normalize(0.0)?;
-            Some(cast(&near, p, &direction, limit * (1.0 + 1e-9))?.position)
-        });
-        lowest(&near, p, starts).unwrap_or(alone)
+        search(coat, p, inside, depths[nearest].abs())?
     };
     let offset = position - p;
     // On the surface itself the offset has no direction, and its length is the distance.
     let distance = if inside { -offset.norm() } else { offset.norm() };
     let normal = coat.normal(&position, &coat.skeletons[nearest].shape.closest(&position).normal);
     Some(SurfaceHit { distance, position, normal, skeleton: blend::territory(&coat.skeletons, &position) })
+}
+
+/// The closest point of a blend. Outside, `limit` is a bound of the distance: the isolated surface of the nearest
+/// skeleton lies in the solid.
+fn search(coat: &Coat, p: &Vec3, inside: bool, limit: f64) -> Option<Vec3> {
+    let length = |x: &Vec3| (x - p).norm();
+    // Starts up to twice as far as the closest may still slide below it.
+    let probe = |coat: &Coat, u: &Vec3, reach: f64| {
+        let hit = if inside { exit(coat, p, u) } else { cast(coat, p, u, reach).map(|hit| hit.position) };
+        hit.filter(|x| length(x) <= reach)
+    };
+    let (first, reach) =
+        if inside { (coat.clone(), f64::INFINITY) } else { (subset(coat, p, 2.0 * limit), 2.0 * limit) };
+    let directions = if inside { outward(&first, p) } else { toward(&first, p) };
+    let hits: Vec<Vec3> = directions.iter().filter_map(|u| probe(&first, u, reach)).collect();
+    let reach = 2.0 * hits.iter().map(length).min_by(f64::total_cmp)?;
+    let near = subset(coat, p, reach);
+    let best = lowest(&near, p, hits.into_iter().filter(|x| length(x) <= reach))?;
+    // A look round the best finds its lower neighbours.
+    let Some(axis) = (best - p).try_normalize(0.0) else { return Some(best) };
+    let again = cone(&axis).filter_map(|u| probe(&near, &u, reach)).chain([best]);
+    lowest(&near, p, again)
 }
 
 /// The skeletons whose field reaches the ball of this radius round `p`.
@@ -96,12 +96,35 @@ fn across(shape: &Shape) -> Vec3 {
 
 /// Directions in which to look for the surface from inside: away from each skeleton, down the field, and a fixed fan
 /// of axes and diagonals.
-fn directions(coat: &Coat, p: &Vec3) -> impl Iterator<Item = Vec3> {
+fn outward(coat: &Coat, p: &Vec3) -> Vec<Vec3> {
     let away = coat.skeletons.iter().map(|k| k.shape.closest(p).normal);
     let downhill = -coat.excess_gradient(p).1;
     let fan = (0..27).map(|i| Vec3::new(f64::from(i % 3 - 1), f64::from(i / 3 % 3 - 1), f64::from(i / 9 - 1)));
-    let all: Vec<Vec3> = away.chain([downhill]).chain(fan).collect();
-    all.into_iter().filter_map(|u| u.try_normalize(0.0))
+    away.chain([downhill]).chain(fan).filter_map(|u| u.try_normalize(0.0)).collect()
+}
+
+/// Directions in which to look from outside: to each skeleton, between the isolated surfaces of neighbours, and to
+/// where a skeleton comes close to another that is close to `p`, as a blend bulges there.
+fn toward(coat: &Coat, p: &Vec3) -> Vec<Vec3> {
+    const PAIRED: usize = 8;
+    let mut targets: Vec<Vec3> = coat.skeletons.iter().map(|k| on_isolated(k, p)).collect();
+    for a in coat.skeletons.iter().take(PAIRED) {
+        for b in coat.skeletons.iter().take(PAIRED) {
+            targets.push((on_isolated(a, p) + on_isolated(b, p)) * 0.5);
+            let on_b = b.shape.closest_point(&a.shape.closest_point(p));
+            targets.extend([on_b, a.shape.closest_point(&on_b)]);
+        }
+    }
+    targets.iter().filter_map(|x| (x - p).try_normalize(0.0)).collect()
+}
+
+/// Three rings of directions round an axis.
+fn cone(axis: &Vec3) -> impl Iterator<Item = Vec3> {
+    let (axis, (e1, e2)) = (*axis, tangents(axis));
+    (0..24).map(move |k| {
+        let (sine, cosine) = libm::sincos(f64::from(k % 8) * std::f64::consts::FRAC_PI_4);
+        (axis + (e1 * cosine + e2 * sine) * [0.15, 0.45, 1.2][k as usize / 8]).normalize()
+    })
 }
 
 /// Where a ray from the inside leaves the solid; `None` if it does not.

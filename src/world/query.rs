@@ -1,1 +1,227 @@
-//! Questions between steps: fields, contacts of a pair, rays, overlaps, closest points, seeds.
+//! Questions between steps: fields, rays, overlaps, closest points, seeds.
+
+use super::{BodyId, LinkId, SkeletonId, World};
+use crate::coat::{Coat, seeds, territory};
+use crate::error::{Error, Result, out_of_range, require, require_finite};
+use crate::field::blend;
+use crate::math::Vec3;
+use crate::surface::{SurfaceHit, closest, ray};
+
+/// Where a ray meets a coat.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RayHit {
+    /// The body.
+    pub body: BodyId,
+    /// The link that carries the skeleton.
+    pub link: LinkId,
+    /// The skeleton in whose territory the point lies.
+    pub skeleton: SkeletonId,
+    /// Length of the ray up to the point \[m\]; 0 for a ray that starts inside.
+    pub distance: f64,
+    /// The point, in the world \[m\].
+    pub position: Vec3,
+    /// Outward unit normal of the coat, in the world.
+    pub normal: Vec3,
+}
+
+/// A point of a coat's surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfacePoint {
+    /// The point, in the world \[m\].
+    pub position: Vec3,
+    /// Outward unit normal of the coat, in the world.
+    pub normal: Vec3,
+    /// Signed distance of the point that was asked about: negative inside the solid \[m\].
+    pub distance: f64,
+    /// The link that carries the skeleton.
+    pub link: LinkId,
+    /// The skeleton in whose territory the point lies.
+    pub skeleton: SkeletonId,
+}
+
+/// One sample of a skeleton's share of its coat's surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Seed {
+    /// Where the seed ended, in the world \[m\].
+    pub position: Vec3,
+    /// Outward unit normal of the field there, in the world.
+    pub normal: Vec3,
+    /// It ended on the coat's surface; otherwise on the border of another skeleton's territory, inside the solid.
+    pub valid: bool,
+}
+
+/// A body's coat as it is now, and the arena indices of the skeletons in it.
+pub(super) struct Snapshot {
+    pub(super) coat: Coat,
+    pub(super) skeletons: Vec<usize>,
+}
+
+impl Snapshot {
+    pub(super) fn localise(&self, p: &Vec3) -> Vec3 {
+        p - self.coat.origin
+    }
+
+    pub(super) fn globalise(&self, p: &Vec3) -> Vec3 {
+        p + self.coat.origin
+    }
+}
+
+impl World {
+    /// The enabled skeletons of a body at the present poses, in a frame at its first link.
+    pub(super) fn snapshot(&self, body: usize) -> Snapshot {
+        let body = &self.bodies[body];
+        let links = || body.links.iter().map(|index| &self.links[*index as usize]);
+        let origin = links().next().map_or(Vec3::zeros(), |link| link.desc.pose.position);
+        let mut coat = Coat::new(origin, body.desc.isovalue);
+        let mut skeletons = Vec::new();
+        for link in links().filter(|link| link.enabled) {
+            for &index in &link.skeletons {
+                let skeleton = &self.skeletons[index as usize];
+                if skeleton.enabled {
+                    coat.add(&skeleton.desc.shape, skeleton.profile, &link.desc.pose);
+                    skeletons.push(index as usize);
+                }
+            }
+        }
+        Snapshot { coat, skeletons }
+    }
+
+    /// Bodies that take part and have a bit of the mask in their category, in the order of their ids.
+    fn bodies_of(&self, mask: u64) -> impl Iterator<Item = usize> + '_ {
+        self.bodies.indices().filter(move |index| {
+            let body = &self.bodies[*index];
+            body.enabled && body.desc.category & mask != 0
+        })
+    }
+
+    fn skeleton_and_link(&self, index: usize) -> (SkeletonId, LinkId) {
+        (self.skeletons.id_of(index), self.links.id_of(self.skeletons[index].link as usize))
+    }
+
+    /// The field of a body at points of the world: values into `values`, gradients \[1/m\] into `gradients`, each as
+    /// long as `points` if given.
+    ///
+    /// The value is the sum over the skeletons \[97, eq. (1)\]: the surface is where it equals the body's isovalue, the
+    /// solid where it is larger. Zero for a body without enabled skeletons.
+    pub fn evaluate_field(
+        &self,
+        body: BodyId,
+        points: &[[f64; 3]],
+        mut values: Option<&mut [f64]>,
+        mut gradients: Option<&mut [[f64; 3]]>,
+    ) -> Result<()> {
+        self.bodies.get(body)?;
+        let lengths = [values.as_ref().map(|out| out.len()), gradients.as_ref().map(|out| out.len())];
+        if lengths.iter().flatten().any(|length| *length != points.len()) {
+            return Err(Error::Unsupported("values and gradients must be as long as points"));
+        }
+        if let Some(p) = points.iter().find(|p| !p.iter().all(|x| x.is_finite())) {
+            return Err(out_of_range("point", format_args!("({}, {}, {})", p[0], p[1], p[2]), "finite"));
+        }
+        let snapshot = self.snapshot(body.index());
+        for (k, point) in points.iter().enumerate() {
+            let local = snapshot.localise(&Vec3::from(*point));
+            let (value, gradient) = blend::value_gradient(&snapshot.coat.skeletons, &local);
+            if let Some(values) = &mut values {
+                values[k] = value;
+            }
+            if let Some(gradients) = &mut gradients {
+                gradients[k] = gradient.into();
+            }
+        }
+        Ok(())
+    }
+
+    /// The first coat that a ray meets, among enabled bodies whose category shares a bit with `mask`.
+    ///
+    /// `direction` needs no unit length; `max_distance` \[m\] is at least 0 and may be infinite. A ray that starts
+    /// inside a coat meets it at distance 0. Of coats at the same distance, the first body in the order of ids wins.
+    pub fn cast_ray(&self, origin: &Vec3, direction: &Vec3, max_distance: f64, mask: u64) -> Result<Option<RayHit>> {
+        require_finite("ray origin", origin)?;
+        require_finite("ray direction", direction)?;
+        // Scaled first, so that no square overflows or vanishes.
+        let largest = direction.amax();
+        require("length of the ray direction", largest, "> 0", |x| x > 0.0)?;
+        if max_distance.is_nan() || max_distance < 0.0 {
+            return Err(out_of_range("max_distance", max_distance, "at least 0 (infinity is fine)"));
+        }
+        let direction = (direction / largest).normalize();
+        let mut length = max_distance;
+        let mut first = None;
+        for body in self.bodies_of(mask) {
+            let snapshot = self.snapshot(body);
+            let Some(hit) = ray::cast(&snapshot.coat, &snapshot.localise(origin), &direction, length) else { continue };
+            if first.is_none() || hit.distance < length {
+                length = hit.distance;
+                let (skeleton, link) = self.skeleton_and_link(snapshot.skeletons[hit.skeleton]);
+                first = Some(RayHit {
+                    body: self.bodies.id_of(body),
+                    link,
+                    skeleton,
+                    distance: hit.distance,
+                    position: snapshot.globalise(&hit.position),
+                    normal: hit.normal,
+                });
+            }
+            if length == 0.0 {
+                break;
+            }
+        }
+        Ok(first)
+    }
+
+    /// Bodies whose coat comes within `radius` \[m\] of a point (with radius 0: that contain it), among enabled bodies
+    /// whose category shares a bit with `mask`; in the order of their ids.
+    pub fn overlap_sphere(&self, center: &Vec3, radius: f64, mask: u64) -> Result<Vec<BodyId>> {
+        require_finite("center", center)?;
+        require("radius", radius, "at least 0", |x| x >= 0.0)?;
+        let touches = |body: &usize| {
+            let Snapshot { coat, .. } = self.snapshot(*body);
+            let p = center - coat.origin;
+            let in_reach = |k: &crate::field::Placed| k.shape.closest(&p).distance <= radius + k.profile.radius;
+            coat.skeletons.iter().any(in_reach)
+                && (coat.excess(&p) >= 0.0 || closest::closest(&coat, &p).is_some_and(|hit| hit.distance <= radius))
+        };
+        Ok(self.bodies_of(mask).filter(touches).map(|body| self.bodies.id_of(body)).collect())
+    }
+
+    /// The point of a body's surface closest to a point of the world, which may be inside; `None` for a body without
+    /// enabled skeletons. Also answers for a body that is disabled as a whole.
+    pub fn closest_point(&self, body: BodyId, point: &Vec3) -> Result<Option<SurfacePoint>> {
+        self.bodies.get(body)?;
+        require_finite("point", point)?;
+        let snapshot = self.snapshot(body.index());
+        let hit = closest::closest(&snapshot.coat, &snapshot.localise(point));
+        Ok(hit.map(|SurfaceHit { distance, position, normal, skeleton }| {
+            let (skeleton, link) = self.skeleton_and_link(snapshot.skeletons[skeleton]);
+            SurfacePoint { position: snapshot.globalise(&position), normal, distance, link, skeleton }
+        }))
+    }
+
+    /// The seeds of a skeleton, always in the same order: see [`coat::seeds`](crate::coat::seeds). At least as many as
+    /// the skeleton's (or else the world's) seed count; none for a plane, which has no bounds to spread them over, and
+    /// none while the skeleton or its link is disabled.
+    pub fn seeds(&self, skeleton: SkeletonId) -> Result<Vec<Seed>> {
+        let link = self.skeletons.get(skeleton)?.link as usize;
+        let snapshot = self.snapshot(self.links[link].body as usize);
+        let Some(index) = snapshot.skeletons.iter().position(|k| *k == skeleton.index()) else {
+            return Ok(Vec::new());
+        };
+        let desc = &self.skeletons[skeleton.index()].desc;
+        let count = if desc.seed_count == 0 { self.desc.seed_count } else { desc.seed_count };
+        let mut rays = Vec::new();
+        seeds::rays(&desc.shape, desc.thickness, count as usize, &mut rays);
+        let pose = snapshot.coat.localise(&self.links[link].desc.pose);
+        for ray in &mut rays {
+            *ray = ray.transformed(&pose);
+        }
+        let mut ends = Vec::new();
+        territory::seeds(&snapshot.coat, index, &rays, &mut ends);
+        let globalise = |seed: &territory::Seed| Seed {
+            position: snapshot.globalise(&seed.position),
+            normal: seed.normal,
+            valid: seed.is_valid(),
+        };
+        Ok(ends.iter().map(globalise).collect())
+    }
+}

@@ -1,0 +1,165 @@
+//! Contact forces by brute force: the volume integral of `∇p_b` over the part of the overlap where b is the less
+//! compressed, `F = ∫ ∇p_b dV over {0 < p_b < p_a}`, line by line along each axis. It knows nothing of surfaces,
+//! frames or patches, and has distances and profiles of its own.
+
+use isocoat::field::Shape;
+use isocoat::math::{Pose, Vec3};
+
+use super::Coat;
+
+fn to_segment(a: Vec3, b: Vec3, p: Vec3) -> f64 {
+    let ab = b - a;
+    let s = ((p - a).dot(&ab) / ab.dot(&ab)).clamp(0.0, 1.0);
+    (p - a - ab * s).norm()
+}
+
+/// Distance to a shape whose points are given in the world.
+fn distance(shape: &Shape, p: Vec3) -> f64 {
+    match *shape {
+        Shape::Point(a) => (p - a).norm(),
+        Shape::Segment(a, b) => to_segment(a, b, p),
+        Shape::Triangle(a, b, c) => {
+            let n = (b - a).cross(&(c - a));
+            let inside = [(a, b), (b, c), (c, a)].iter().all(|(u, v)| (v - u).cross(&(p - u)).dot(&n) >= 0.0);
+            if inside {
+                (p - a).dot(&n).abs() / n.norm()
+            } else {
+                to_segment(a, b, p).min(to_segment(b, c, p)).min(to_segment(c, a, p))
+            }
+        }
+        Shape::Box { center, half, axes } => {
+            let q = (axes.transpose() * (p - center)).abs() - half;
+            q.sup(&Vec3::zeros()).norm() + q.max().min(0.0)
+        }
+        Shape::Plane { point, normal } => (p - point).dot(&normal),
+    }
+}
+
+/// The default profile, `k = 2c/(R-t)` with c = 1: a parabola outside, linear inside.
+fn profile(d: f64, t: f64, r: f64) -> f64 {
+    if d >= r {
+        0.0
+    } else if d >= t {
+        ((r - d) / (r - t)).powi(2)
+    } else {
+        1.0 + 2.0 / (r - t) * (t - d)
+    }
+}
+
+/// Maximum of a function with one hump between two places, by golden section; stops early at a positive value.
+fn climb(f: &dyn Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
+    const GOLDEN: f64 = 0.618_033_988_749_894_9;
+    for _ in 0..24 {
+        let (x, y) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
+        let (fx, fy) = (f(x), f(y));
+        if fx > 0.0 || fy > 0.0 {
+            return if fx > fy { x } else { y };
+        }
+        if fx > fy { high = y } else { low = x }
+    }
+    0.5 * (low + high)
+}
+
+pub struct Oracle {
+    a: (Coat, Vec<Shape>),
+    b: (Coat, Vec<Shape>),
+}
+
+impl Oracle {
+    pub fn new(a: (&Coat, Pose), b: (&Coat, Pose)) -> Self {
+        let place = |(coat, pose): (&Coat, Pose)| {
+            (coat.clone(), coat.shapes.iter().map(|shape| shape.transformed(&pose)).collect())
+        };
+        Oracle { a: place(a), b: place(b) }
+    }
+
+    fn excess((coat, shapes): &(Coat, Vec<Shape>), p: Vec3) -> f64 {
+        shapes.iter().map(|shape| profile(distance(shape, p), coat.thickness, coat.radius)).sum::<f64>() - 1.0
+    }
+
+    /// Positive in `{0 < p_b < p_a}`; for a rigid b, in `{0 < p_a} within b`, negated roles for a rigid a.
+    fn side(&self, p: Vec3) -> (f64, f64) {
+        let (ea, eb) = (Self::excess(&self.a, p), Self::excess(&self.b, p));
+        let (pa, pb) = (ea * self.a.0.stiffness_scale, eb * self.b.0.stiffness_scale);
+        match (self.a.0.rigid, self.b.0.rigid) {
+            (false, false) => (pb.min(pa - pb), pb),
+            // Rigid b: F = -∫ ∇p_a over the overlap.
+            (false, true) => (pa.min(eb * self.a.0.stiffness_scale), -pa),
+            (true, false) => (pb.min(ea * self.b.0.stiffness_scale), pb),
+            _ => unreachable!("two rigid bodies have no contact surface"),
+        }
+    }
+
+    /// A box that holds the overlap: no coat here reaches further than 1.45 of its thickness, not even blended in two.
+    fn overlap(&self) -> (Vec3, Vec3) {
+        let bounds = |(coat, shapes): &(Coat, Vec<Shape>)| {
+            let reach = if shapes.len() > 1 { 1.45 * coat.thickness } else { coat.thickness };
+            let each = shapes.iter().map(|shape| match shape {
+                // A level floor.
+                Shape::Plane { point, .. } => (Vec3::repeat(-1e9), Vec3::new(1e9, 1e9, point.z + reach)),
+                other => other.bounds(reach),
+            });
+            each.reduce(|(l, h), (low, high)| (l.inf(&low), h.sup(&high))).unwrap()
+        };
+        let ((la, ha), (lb, hb)) = (bounds(&self.a), bounds(&self.b));
+        (la.sup(&lb), ha.inf(&hb))
+    }
+
+    /// Force on b, with `n` by `n` lines along each axis.
+    pub fn force(&self, n: usize) -> Vec3 {
+        let (low, high) = self.overlap();
+        const STEPS: usize = 24;
+        let mut force = Vec3::zeros();
+        for axis in 0..3 {
+            let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+            let cell = Vec3::from_fn(|i, _| (high[i] - low[i]) / n as f64);
+            for i in 0..n {
+                for j in 0..n {
+                    let at = |s: f64| {
+                        let mut p = Vec3::zeros();
+                        p[u] = low[u] + (i as f64 + 0.5) * cell[u];
+                        p[v] = low[v] + (j as f64 + 0.5) * cell[v];
+                        p[axis] = low[axis] + s * (high[axis] - low[axis]);
+                        p
+                    };
+                    let positive = |s: f64| self.side(at(s)).0;
+                    let samples: Vec<f64> = (0..=STEPS).map(|step| positive(step as f64 / STEPS as f64)).collect();
+                    // Places where the sign is known, those between the samples included.
+                    let mut signs: Vec<(f64, bool)> = Vec::with_capacity(STEPS + 4);
+                    for step in 0..=STEPS {
+                        let s = step as f64 / STEPS as f64;
+                        let hidden = step > 0 && step < STEPS && samples[step] <= 0.0;
+                        // A hump rises no further above a sample than its neighbours lie below it.
+                        let top_at_most = |other: f64| samples[step] >= other && 2.0 * samples[step] > other;
+                        if hidden && top_at_most(samples[step - 1]) && top_at_most(samples[step + 1]) {
+                            let top = climb(&positive, s - 1.0 / STEPS as f64, s + 1.0 / STEPS as f64);
+                            if positive(top) > 0.0 {
+                                if top < s {
+                                    signs.extend([(top, true), (s, false)]);
+                                } else {
+                                    signs.extend([(s, false), (top, true)]);
+                                }
+                                continue;
+                            }
+                        }
+                        signs.push((s, samples[step] > 0.0));
+                    }
+                    for ends in signs.windows(2) {
+                        let [(mut x, inside), (mut y, next)] = [ends[0], ends[1]];
+                        if inside == next {
+                            continue;
+                        }
+                        for _ in 0..40 {
+                            let m = 0.5 * (x + y);
+                            if (positive(m) > 0.0) == inside { x = m } else { y = m }
+                        }
+                        // Upper ends of intervals count plus, lower ends minus.
+                        let sign = if inside { 1.0 } else { -1.0 };
+                        force[axis] += sign * self.side(at(0.5 * (x + y))).1 * cell[u] * cell[v];
+                    }
+                }
+            }
+        }
+        force
+    }
+}
