@@ -92,10 +92,7 @@ fn round_pairs_meet_the_tolerance_asked_for() {
     for scheme in [Scheme::Auto, Scheme::Polar, Scheme::Adaptive] {
         for tolerance in [5e-2, 5e-3, 5e-4, 5e-5] {
             let (worst, sideways, bounded, evaluations) = sweep(scheme, tolerance);
-            println!(
-                "{scheme:?} {tolerance:.0e}: {worst:.1e} {sideways:.1e} {:.1}% {evaluations:.0}",
-                100.0 * bounded
-            );
+            println!("{scheme:?} {tolerance:.0e}: {worst:.1e} {sideways:.1e} {:.1}% {evaluations:.0}", 100.0 * bounded);
             if worst > tolerance || bounded < 0.95 || sideways > 1e-4f64.max(0.0) && scheme != Scheme::Adaptive {
                 failures.push(format!("{scheme:?} {tolerance}"));
             }
@@ -117,8 +114,7 @@ fn scenes() -> Vec<Scene> {
         &[Shape::Triangle(Vec3::new(-0.3, -0.2, 0.0), Vec3::new(0.3, -0.2, 0.0), Vec3::new(0.0, 0.4, 0.0))],
         0.1,
     );
-    let dumbbell =
-        Coat::new(&[Shape::Point(Vec3::new(-0.12, 0.0, 0.0)), Shape::Point(Vec3::new(0.12, 0.0, 0.0))], 0.1);
+    let dumbbell = Coat::new(&[Shape::Point(Vec3::new(-0.12, 0.0, 0.0)), Shape::Point(Vec3::new(0.12, 0.0, 0.0))], 0.1);
     let cuboid = Coat::cuboid(Vec3::new(0.2, 0.15, 0.1), 0.05);
     let tilt = |random: &mut Random, most: f64| Vec3::new(random.range(-most, most), random.range(-most, most), 0.0);
     let _ = tilt;

@@ -79,8 +79,8 @@ pub fn integrate(
     workspace: &mut Workspace,
     nodes: &mut Vec<Node>,
 ) -> Result<Integrated, LeansOver> {
-    let mut solver = Solver { pair, frame: Frame::new(at, [1.0, 1.0]), accept: 0.0, evaluations: 0 };
-    solver.accept = 0.15 * at.sum * tolerance.sqrt().min(0.1);
+    let mut solver = Solver { pair, frame: Frame::new(at, [1.0, 1.0]), accept: 0.0, border_step: 0.0, evaluations: 0 };
+    solver.aim(at.sum, tolerance);
     if !solver.fit(at, extent) {
         // No clear border along an axis: the prediction will do, the cells spread by themselves.
         let scale = solver.frame.scale.map(|s| s.min(extent));

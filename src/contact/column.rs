@@ -67,6 +67,8 @@ pub struct Solver<'a> {
     pub frame: Frame,
     /// `|Φ|` below which the last Newton step is extrapolated instead of evaluated.
     pub accept: f64,
+    /// Relative Newton step below which the border is taken without another look.
+    pub border_step: f64,
     /// Evaluations so far.
     pub evaluations: u32,
 }
@@ -75,6 +77,14 @@ pub struct Solver<'a> {
 const STEEPEST: f64 = 0.12;
 
 impl Solver<'_> {
+    /// Sets how far the roots are solved for a contact of this highest `σ`. What a last Newton step leaves of the border
+    /// is its square, and the rules count on the pressure being zero there; what is left of `Φ` tilts the vector area
+    /// in proportion.
+    pub fn aim(&mut self, peak: f64, tolerance: f64) {
+        self.accept = peak * tolerance.min(0.015);
+        self.border_step = 0.3 * tolerance.sqrt();
+    }
+
     /// Finds the surface over `(x, y)` from a guess of its height. `None` where it leans over or is not found.
     #[inline]
     pub fn column(&mut self, x: f64, y: f64, guess: f64) -> Option<Column> {
@@ -170,7 +180,9 @@ impl Solver<'_> {
             // Along the surface, σ changes by `determinant / phi_z` a unit of s.
             let rate = if phi_z < 0.0 { determinant / phi_z } else { 0.0 };
             let on_surface = sample.sum - sample.difference * sum_z / if phi_z < 0.0 { phi_z } else { -1.0 };
-            if settled && phi_z < 0.0 {
+            // The sign of an extrapolated value counts when the extrapolation was small beside it.
+            let clear = sample.difference.abs() < 0.2 * on_surface.abs();
+            if clear && phi_z < 0.0 {
                 if on_surface > 0.0 {
                     inside = s;
                 } else {
@@ -192,7 +204,7 @@ impl Solver<'_> {
                 z *= next / s;
             }
             s = next;
-            if settled && rate < 0.0 && step.abs() <= BORDER_STEP * s && on_surface.abs() < 0.3 * peak {
+            if settled && rate < 0.0 && step.abs() <= self.border_step * s && on_surface.abs() < 0.3 * peak {
                 return Some((s, z));
             }
             if outside - inside <= 1e-9 * s {
@@ -205,7 +217,3 @@ impl Solver<'_> {
         None
     }
 }
-
-/// Relative Newton step below which the border is taken without another look: what is left is its square, and the
-/// force changes with the square of that, since the pressure vanishes there.
-const BORDER_STEP: f64 = 0.03;

@@ -134,6 +134,9 @@ const RULES: [Rule; 6] = [
 /// Azimuths and radial rule, from the cheapest up.
 const LEVELS: [(usize, usize); 8] = [(6, 0), (8, 0), (12, 1), (16, 2), (24, 3), (32, 3), (48, 4), (64, 5)];
 
+/// Part of the tolerance that the roots may use up.
+const SOLVING: f64 = 0.2;
+
 /// A patch that was integrated.
 pub struct Integrated {
     /// Estimated relative error of its force.
@@ -163,9 +166,8 @@ pub fn integrate(
     nodes: &mut Vec<Node>,
 ) -> Result<Integrated, NotStarShaped> {
     let first = nodes.len();
-    let mut solver = Solver { pair, frame: Frame::new(at, [1.0, 1.0]), accept: 0.0, evaluations: 0 };
-    // The height's error is of second order in what is left of Φ; so is that of the border.
-    solver.accept = 0.15 * at.sum * tolerance.sqrt().min(0.1);
+    let mut solver = Solver { pair, frame: Frame::new(at, [1.0, 1.0]), accept: 0.0, border_step: 0.0, evaluations: 0 };
+    solver.aim(at.sum, tolerance);
     let fail = |evaluations, nodes: &mut Vec<Node>| {
         nodes.truncate(first);
         Err(NotStarShaped { evaluations })
@@ -186,6 +188,8 @@ pub fn integrate(
         let Some(error) = sweep(&mut solver, at.sum, *azimuths, &RULES[*rule], &mut border, nodes) else {
             return fail(solver.evaluations, nodes);
         };
+        // The roots are solved to a part of the tolerance.
+        let error = error + SOLVING * tolerance;
         let last = index + 1 == LEVELS.len();
         if error <= tolerance || last && last_resort {
             return Ok(Integrated { error, evaluations: solver.evaluations, frame: solver.frame, border });
@@ -212,10 +216,14 @@ fn sweep(
     let center = solver.column(0.0, 0.0, 0.0)?;
     let mut half = [Vec3::zeros(); 2];
     let mut coarse = Vec3::zeros();
-    let mut height = 0.0;
-    for azimuth in 0..azimuths {
+    let direction = |azimuth: usize| {
         let angle = slice * (azimuth as f64 + 0.5);
-        let direction = (libm::cos(angle), libm::sin(angle));
+        (libm::cos(angle), libm::sin(angle))
+    };
+    // The first azimuth is solved twice, so that all of a round patch start alike and none errs more than another.
+    let (_, mut height) = solver.border(direction(0), peak, 0.0)?;
+    for azimuth in 0..azimuths {
+        let direction = direction(azimuth);
         let (s, z) = solver.border(direction, peak, height)?;
         height = z;
         borders.push(s);

@@ -17,6 +17,7 @@ use super::pair::{Pair, Side};
 use super::patch::Node;
 use super::surface::Surface;
 use crate::coat::seeds::{Ray, plane_rays};
+use crate::coat::territory;
 use crate::field::Shape;
 use crate::math::Vec3;
 
@@ -74,7 +75,8 @@ fn cast(pair: &Pair, from_a: bool, skeleton: usize, ray: &Ray, nodes: &mut Vec<N
         return evaluations;
     }
     let plane = matches!(own.skeletons[skeleton].shape, Shape::Plane { .. });
-    let (mut low, mut high) = (if plane { outer - 4.0 * profile.thickness } else { 0.0 }, outer);
+    // Rays reach back into a solid core as far as their face is the nearest; a half-space has no end.
+    let (mut low, mut high) = (if plane { outer - 4.0 * profile.thickness } else { -ray.core }, outer);
     let start = pair.sample(&at(low));
     evaluations += 1;
     if sign * start.difference <= 0.0 {
@@ -105,9 +107,7 @@ fn cast(pair: &Pair, from_a: bool, skeleton: usize, ray: &Ray, nodes: &mut Vec<N
     }
     let position = at(r);
     let pressure = pair.scale * sample.sum;
-    if pressure <= 0.0
-        || own.skeletons.len() > 1 && crate::field::blend::territory(&own.skeletons, &position) != skeleton
-    {
+    if pressure <= 0.0 || !territory::owns(&own.skeletons, own.isovalue, skeleton, &position) {
         return evaluations;
     }
     let steepness = sample.difference_gradient.norm();
