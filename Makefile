@@ -32,7 +32,7 @@ STAGE     := $(WORK)/stage
 OUT       := out
 STATICLIB := $(TARGET)/release/libisocoat.a
 SHAREDLIB := $(TARGET)/release/libisocoat.$(if $(filter Darwin,$(shell uname -s)),dylib,so)
-HEADERS   := $(wildcard include/isocoat/*) $(wildcard bindings/*/*.hpp)
+HEADERS   := $(wildcard include/isocoat/* bindings/*/*.hpp tests/c/*.h tests/cpp/*.h tests/cpp/*.hpp)
 
 WARNINGS     := -Wall -Wextra -Wpedantic -Wshadow -Werror
 C_FLAGS      := -std=c11 -O2 -g $(WARNINGS) -Wstrict-prototypes -Iinclude
@@ -74,17 +74,22 @@ $(2): $(1) $(HEADERS) $(STATICLIB) Makefile
 	$(3) $(1) -o $$@ $(STATICLIB) $(4) $(STATIC_LIBS)
 endef
 
-$(call compile_each,$(C_TESTS),$(WORK)/tests/c,,$$(CC) $$(C_FLAGS) $$(CFLAGS),$$(CMOCKA))
-$(call compile_each,$(C_TESTS),$(WORK)/tests/c,-asan,$$(CC) $$(C_FLAGS) $$(ASAN_FLAGS) $$(CFLAGS),$$(CMOCKA))
-$(call compile_each,$(CPP_TESTS),$(WORK)/tests/cpp,-float,$$(CXX) $$(CXX_FLAGS) $$(CXXFLAGS) $$(call BULLET_CFLAGS,bullet),$$(call BULLET_LIBS,bullet))
-$(call compile_each,$(CPP_TESTS),$(WORK)/tests/cpp,-double,$$(CXX) $$(CXX_FLAGS) $$(CXXFLAGS) $$(call BULLET_CFLAGS,bullet-float64),$$(call BULLET_LIBS,bullet-float64))
-$(call compile_each,$(C_EXAMPLES),$(WORK)/examples,,$$(CC) $$(C_FLAGS) $$(CFLAGS),)
-$(call compile_each,$(CPP_EXAMPLES),$(WORK)/examples,,$$(CXX) $$(CXX_FLAGS) $$(CXXFLAGS) $$(call BULLET_CFLAGS,bullet),$$(call BULLET_LIBS,bullet))
+c_line      = $$(CC) $$(C_FLAGS) $(1) $$(CFLAGS)
+bullet_line = $$(CXX) $$(CXX_FLAGS) $$(CXXFLAGS) $$(call BULLET_CFLAGS,$(1))
+bullet_libs = $$(call BULLET_LIBS,$(1))
 
-C_TEST_BINS          := $(call named,$(C_TESTS),$(WORK)/tests/c)
-C_TEST_BINS_ASAN     := $(addsuffix -asan,$(C_TEST_BINS))
-BULLET_BINS          := $(call named,$(CPP_TESTS),$(WORK)/tests/cpp,-float) $(call named,$(CPP_TESTS),$(WORK)/tests/cpp,-double)
-EXAMPLE_BINS         := $(call named,$(C_EXAMPLES),$(WORK)/examples) $(call named,$(CPP_EXAMPLES),$(WORK)/examples)
+$(call compile_each,$(C_TESTS),$(WORK)/tests/c,,$(call c_line),$$(CMOCKA))
+$(call compile_each,$(C_TESTS),$(WORK)/tests/c,-asan,$(call c_line,$$(ASAN_FLAGS)),$$(CMOCKA))
+$(call compile_each,$(CPP_TESTS),$(WORK)/tests/cpp,-float,$(call bullet_line,bullet),$(call bullet_libs,bullet))
+$(call compile_each,$(CPP_TESTS),$(WORK)/tests/cpp,-double,$\
+	$(call bullet_line,bullet-float64),$(call bullet_libs,bullet-float64))
+$(call compile_each,$(C_EXAMPLES),$(WORK)/examples,,$(call c_line))
+$(call compile_each,$(CPP_EXAMPLES),$(WORK)/examples,,$(call bullet_line,bullet),$(call bullet_libs,bullet))
+
+C_TEST_BINS      := $(call named,$(C_TESTS),$(WORK)/tests/c)
+C_TEST_BINS_ASAN := $(addsuffix -asan,$(C_TEST_BINS))
+BULLET_BINS      := $(foreach kind,float double,$(call named,$(CPP_TESTS),$(WORK)/tests/cpp,-$(kind)))
+EXAMPLE_BINS     := $(call named,$(C_EXAMPLES) $(CPP_EXAMPLES),$(WORK)/examples)
 
 # ---- demo ------------------------------------------------------------------------------------------------------------
 
@@ -140,7 +145,8 @@ test-rust:
 
 # Private items too: who reads the sources follows the same links.
 test-doc:
-	RUSTDOCFLAGS='-D warnings -A rustdoc::private_intra_doc_links' $(CARGO) doc --release --no-deps --document-private-items
+	RUSTDOCFLAGS='-D warnings -A rustdoc::private_intra_doc_links' \
+		$(CARGO) doc --release --no-deps --document-private-items
 
 # The checked-in header is what the sources say (regenerate with `make header`).
 test-header:
@@ -157,8 +163,11 @@ test-symbols: build
 symbols: build ## accept today's exported functions as tests/abi/symbols.txt
 	@tools/symbols.sh '$(SHAREDLIB)' '$(STATICLIB)' update
 
+# A program that hangs must not hang the run.
+LIMIT := $(if $(shell command -v timeout),timeout 300)
 run_each = @test -n '$(strip $(1))' || { echo 'no program found for this stage'; exit 1; }; \
-	for program in $(1); do echo "-- $${program\#\#*/}"; $(2) $$program || { echo "$$program failed"; exit 1; }; done; \
+	for program in $(1); do echo "-- $${program\#\#*/}"; $(LIMIT) $(2) $$program || { status=$$?; \
+		echo "$$program failed: exit code $$status$$(test $$status != 124 || echo ', too slow')"; exit 1; }; done; \
 	echo '$(words $(1)) program(s) passed'
 
 test-c: $(C_TEST_BINS)

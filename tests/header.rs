@@ -50,6 +50,10 @@ fn names<'a>(source: &'a str, keyword: &'a str) -> impl Iterator<Item = &'a str>
 fn tidy(block: &str) -> String {
     let mut lines: Vec<String> = Vec::new();
     for line in block.lines() {
+        // What stands round the notes to cbindgen, so that rustdoc does not show them.
+        if ["* <!--", "* -->"].contains(&line.trim()) {
+            continue;
+        }
         if line.trim() == "*/" {
             while lines.last().is_some_and(|last| last.trim() == "*") {
                 lines.pop();

@@ -51,6 +51,7 @@
 #if defined(__GNUC__) || defined(__clang__)
 #define ISOCOAT_MUST_USE __attribute__((warn_unused_result))
 #elif defined(_MSC_VER)
+#include <sal.h>
 #define ISOCOAT_MUST_USE _Check_return_
 #else
 #define ISOCOAT_MUST_USE
@@ -424,7 +425,8 @@ typedef struct isocoat_body_desc {
     /** Viscous friction, in sqrt(N s/m^3), at least 0; a pair takes the product. Default 0. */
     double viscous_friction;
     /**
-     * Hunt-Crossley dissipation, in s/m, at least 0; a pair takes the mean weighted by the other's softness. Default 0.
+     * Hunt-Crossley dissipation, in s/m, at least 0; a pair takes the mean weighted by the other's softness.
+     * Default 0.
      */
     double dissipation;
     /** What this body is, as bits. Default 1. */
@@ -771,19 +773,20 @@ isocoat_status isocoat_link_get_skeletons(const isocoat_world *world,
  */
 typedef uint32_t isocoat_shape;
 
-/** A point: points[0]. */
+/** A point: `points[0]`. */
 #define ISOCOAT_SHAPE_POINT 0u
-/** A segment from points[0] to points[1]; a point if they are one. */
+/** A segment from `points[0]` to `points[1]`; a point if they are one. */
 #define ISOCOAT_SHAPE_SEGMENT 1u
-/** A triangle of points[0], points[1], points[2]; a segment or a point if it has no area. */
+/** A triangle of `points[0]`, `points[1]`, `points[2]`; a segment or a point if it has no area. */
 #define ISOCOAT_SHAPE_TRIANGLE 2u
 /**
- * A solid box: points[0] is its centre, points[1] its half extents, each > 0, points[2] the rotation of its axes as a
- * vector (axis times angle, in rad).
+ * A solid box: `points[0]` is its centre, `points[1]` its half extents, each > 0, `points[2]` the rotation of its axes
+ * as a vector (axis times angle, in rad).
  */
 #define ISOCOAT_SHAPE_BOX 3u
 /**
- * A half-space: points[0] is a point of its boundary, points[1] the outward normal, of any length but 0. For fixed links only.
+ * A half-space: `points[0]` is a point of its boundary, `points[1]` the outward normal, of any length but 0. For fixed
+ * links only.
  */
 #define ISOCOAT_SHAPE_PLANE 4u
 

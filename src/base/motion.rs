@@ -167,7 +167,10 @@ impl Motion {
     pub fn inverse_moment(&self) -> f64 {
         match &self.inertia {
             Inertia::Immovable | Inertia::Point { .. } => 0.0,
-            Inertia::Solid { inverse, .. } => inverse.trace(),
+            // No eigenvalue is above the largest row sum; exact for principal axes.
+            Inertia::Solid { inverse_local, .. } => {
+                inverse_local.row_iter().map(|row| row.abs().sum()).fold(0.0, f64::max)
+            }
             Inertia::Effective(matrix) => matrix.fixed_view::<3, 3>(3, 3).trace(),
         }
     }

@@ -56,7 +56,7 @@ fn refusal(state: u32) -> Refusal {
     } else if state & WRITING != 0 {
         Refusal::new(
             ISOCOAT_ERROR_LOCKED,
-            "the world is being stepped or changed: no call is possible until that returns, not even from its callbacks",
+            "the world is being stepped or changed: no other call until that returns, not even from its callbacks",
         )
     } else {
         Refusal::new(ISOCOAT_ERROR_LOCKED, "the world is being read: it cannot be changed until that returns")

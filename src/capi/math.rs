@@ -66,7 +66,9 @@ fn diagonal(x: f64, y: f64, z: f64) -> [f64; 9] {
 ///
 /// Errors: OUT_OF_RANGE, INVALID_ARGUMENT. Threads: any.
 ///
+/// <!--
 /// cbindgen:ptrs-as-arrays=[[inertia;9]]
+/// -->
 #[must_use]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn isocoat_inertia_of_sphere(mass: f64, radius: f64, inertia: *mut f64) -> isocoat_status {
@@ -89,7 +91,9 @@ pub unsafe extern "C" fn isocoat_inertia_of_sphere(mass: f64, radius: f64, inert
 ///
 /// Errors: OUT_OF_RANGE, INVALID_ARGUMENT. Threads: any.
 ///
+/// <!--
 /// cbindgen:ptrs-as-arrays=[[half_extents;3], [inertia;9]]
+/// -->
 #[must_use]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn isocoat_inertia_of_box(
@@ -125,7 +129,9 @@ pub unsafe extern "C" fn isocoat_inertia_of_box(
 ///
 /// Errors: OUT_OF_RANGE, INVALID_ARGUMENT. Threads: any.
 ///
+/// <!--
 /// cbindgen:ptrs-as-arrays=[[inertia;9]]
+/// -->
 #[must_use]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn isocoat_inertia_of_capsule(

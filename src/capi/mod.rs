@@ -1,8 +1,8 @@
 //! The C API: what `include/isocoat/isocoat.h` is generated from.
 //!
-//! Mechanism and nouns are apart. Mechanism: [`status`] (codes, messages), [`guard`] (panics, locks), [`pointer`] and
-//! [`descriptor`] (memory of the host), [`handle`], [`buffer`]. Nouns: [`world`], [`body`], [`link`], [`skeleton`], and
-//! what is done with them: [`motion`], [`bulk`], [`report`], [`query`], [`draw`].
+//! Mechanism and nouns are apart. Mechanism: [`status`] (codes, messages), [`version`], [`guard`] (panics, locks),
+//! [`mod@pointer`] and [`descriptor`] (memory of the host), [`handle`], [`buffer`]. Nouns: [`world`], [`body`],
+//! [`link`], [`skeleton`], [`math`], and what is done with them: [`motion`], [`bulk`], [`report`], [`query`], [`draw`].
 //!
 //! Nothing here computes: every function checks the host's pointers, translates, calls the public Rust API, and
 //! translates back. The comments are the manual that goes into the header.
@@ -14,12 +14,14 @@ pub mod body;
 pub mod buffer;
 pub mod bulk;
 pub mod descriptor;
+pub mod draw;
 pub mod guard;
 pub mod handle;
 pub mod link;
 pub mod math;
 pub mod motion;
 pub mod pointer;
+pub mod query;
 pub mod report;
 pub mod skeleton;
 pub mod status;

@@ -169,7 +169,9 @@ pub unsafe extern "C" fn isocoat_link_get_impulse(
 /// Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE, UNSUPPORTED for other links: the host pushes its own bodies
 /// itself. Threads: changes the world.
 ///
+/// <!--
 /// cbindgen:ptrs-as-arrays=[[force;3], [point;3]]
+/// -->
 #[must_use]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn isocoat_link_apply_force(
@@ -196,7 +198,9 @@ pub unsafe extern "C" fn isocoat_link_apply_force(
 ///
 /// Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE, UNSUPPORTED. Threads: changes the world.
 ///
+/// <!--
 /// cbindgen:ptrs-as-arrays=[[torque;3]]
+/// -->
 #[must_use]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn isocoat_link_apply_torque(
@@ -217,7 +221,9 @@ pub unsafe extern "C" fn isocoat_link_apply_torque(
 ///
 /// Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE, UNSUPPORTED. Threads: changes the world.
 ///
+/// <!--
 /// cbindgen:ptrs-as-arrays=[[impulse;3], [point;3]]
+/// -->
 #[must_use]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn isocoat_link_apply_impulse(
@@ -244,7 +250,9 @@ pub unsafe extern "C" fn isocoat_link_apply_impulse(
 ///
 /// Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE, UNSUPPORTED. Threads: changes the world.
 ///
+/// <!--
 /// cbindgen:ptrs-as-arrays=[[impulse;3]]
+/// -->
 #[must_use]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn isocoat_link_apply_angular_impulse(
@@ -268,7 +276,9 @@ pub unsafe extern "C" fn isocoat_link_apply_angular_impulse(
 ///
 /// Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE. Threads: changes the world.
 ///
+/// <!--
 /// cbindgen:ptrs-as-arrays=[[linear;3], [angular;3]]
+/// -->
 #[must_use]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn isocoat_link_set_external_acceleration(

@@ -139,7 +139,8 @@ pub(super) struct List<T> {
 
 impl<T> List<T> {
     /// # Safety
-    /// `first` is NULL or `capacity` elements can be written there, `count` is NULL or writable, until the call returns.
+    /// `first` is NULL or `capacity` elements can be written there, `count` is NULL or writable, until the call
+    /// returns.
     pub unsafe fn new(first: *mut T, capacity: usize, name: &str, count: *mut usize) -> Checked<Self> {
         if capacity > 0 {
             not_null(first, name)?;

@@ -151,7 +151,9 @@ pub unsafe extern "C" fn isocoat_world_collide(
 ///
 /// Errors: INVALID_ARGUMENT, OUT_OF_RANGE. Threads: reads the world.
 ///
+/// <!--
 /// cbindgen:ptrs-as-arrays=[[origin;3], [direction;3]]
+/// -->
 #[must_use]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn isocoat_world_cast_ray(
@@ -190,7 +192,9 @@ pub unsafe extern "C" fn isocoat_world_cast_ray(
 ///
 /// Errors: INVALID_ARGUMENT, OUT_OF_RANGE, BUFFER_TOO_SMALL. Threads: reads the world.
 ///
+/// <!--
 /// cbindgen:ptrs-as-arrays=[[center;3]]
+/// -->
 #[must_use]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn isocoat_world_overlap_sphere(
@@ -223,7 +227,9 @@ pub unsafe extern "C" fn isocoat_world_overlap_sphere(
 ///
 /// Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE. Threads: reads the world.
 ///
+/// <!--
 /// cbindgen:ptrs-as-arrays=[[point;3]]
+/// -->
 #[must_use]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn isocoat_body_closest_point(

@@ -8,7 +8,7 @@ use super::descriptor::{self, Descriptor, OutStruct};
 use super::guard::{free, isocoat_world, read, write};
 use super::handle::{isocoat_link, isocoat_skeleton};
 use super::pointer::Out;
-use super::status::{Checked, isocoat_status};
+use super::status::{Checked, ISOCOAT_ERROR_OUT_OF_RANGE, Refusal, isocoat_status};
 use super::world::unknown;
 use crate::field::Shape;
 use crate::math::{Quat, Vec3, rotation_from_vector, rotation_to_vector};
@@ -17,16 +17,17 @@ use crate::world::SkeletonDesc;
 /// Which primitive a skeleton is: an ISOCOAT_SHAPE_ value. It says what the three points of the descriptor are, all in
 /// the link's frame, in m.
 pub type isocoat_shape = u32;
-/// A point: points[0].
+/// A point: `points[0]`.
 pub const ISOCOAT_SHAPE_POINT: isocoat_shape = 0;
-/// A segment from points[0] to points[1]; a point if they are one.
+/// A segment from `points[0]` to `points[1]`; a point if they are one.
 pub const ISOCOAT_SHAPE_SEGMENT: isocoat_shape = 1;
-/// A triangle of points[0], points[1], points[2]; a segment or a point if it has no area.
+/// A triangle of `points[0]`, `points[1]`, `points[2]`; a segment or a point if it has no area.
 pub const ISOCOAT_SHAPE_TRIANGLE: isocoat_shape = 2;
-/// A solid box: points[0] is its centre, points[1] its half extents, each > 0, points[2] the rotation of its axes as a
-/// vector (axis times angle, in rad).
+/// A solid box: `points[0]` is its centre, `points[1]` its half extents, each > 0, `points[2]` the rotation of its axes
+/// as a vector (axis times angle, in rad).
 pub const ISOCOAT_SHAPE_BOX: isocoat_shape = 3;
-/// A half-space: points[0] is a point of its boundary, points[1] the outward normal, of any length but 0. For fixed links only.
+/// A half-space: `points[0]` is a point of its boundary, `points[1]` the outward normal, of any length but 0. For fixed
+/// links only.
 pub const ISOCOAT_SHAPE_PLANE: isocoat_shape = 4;
 
 /// A primitive fixed in a link's frame, and the field it emits. Begin with isocoat_skeleton_desc_default().
@@ -94,6 +95,18 @@ impl From<&SkeletonDesc> for isocoat_skeleton_desc {
 
 impl isocoat_skeleton_desc {
     fn to_rust(self) -> Checked<SkeletonDesc> {
+        // Before the shape decides what it degenerates to.
+        let used = match self.shape {
+            ISOCOAT_SHAPE_POINT => 1,
+            ISOCOAT_SHAPE_SEGMENT | ISOCOAT_SHAPE_PLANE => 2,
+            _ => 3,
+        };
+        for (index, [x, y, z]) in self.points[..used].iter().enumerate() {
+            if ![x, y, z].iter().all(|x| x.is_finite()) {
+                let message = format!("points[{index}] is ({x}, {y}, {z}); must be finite");
+                return Err(Refusal::new(ISOCOAT_ERROR_OUT_OF_RANGE, message));
+            }
+        }
         let [a, b, c] = self.points.map(Vec3::from);
         let shape = match self.shape {
             ISOCOAT_SHAPE_POINT => Shape::Point(a),

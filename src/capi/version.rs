@@ -70,6 +70,9 @@ const LAYOUTS: &[Layout] = &[
     growable::<super::body::isocoat_body_desc>(),
     growable::<super::link::isocoat_link_desc>(),
     growable::<super::skeleton::isocoat_skeleton_desc>(),
+    fixed::<super::query::isocoat_ray_hit>("isocoat_ray_hit"),
+    fixed::<super::query::isocoat_surface_point>("isocoat_surface_point"),
+    growable::<super::draw::isocoat_debug_draw>(),
 ];
 
 /// What isocoat_check_abi calls: compares a host's version and struct sizes with the library's.
@@ -97,8 +100,8 @@ fn check_version(version: u32) -> Checked<()> {
         return Ok(());
     }
     let message = format!(
-        "the host was compiled with isocoat {major}.{minor}.{patch}; this library is {MAJOR}.{MINOR}.{PATCH}, and serves \
-         hosts of {MAJOR}.{first}.0 to {MAJOR}.{MINOR}.x",
+        "the host was compiled with isocoat {major}.{minor}.{patch}; this library is {MAJOR}.{MINOR}.{PATCH}, and \
+         serves hosts of {MAJOR}.{first}.0 to {MAJOR}.{MINOR}.x",
         first = if MAJOR == 0 { MINOR } else { 0 },
     );
     Err(Refusal::new(ISOCOAT_ERROR_UNSUPPORTED, message))

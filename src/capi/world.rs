@@ -347,3 +347,72 @@ pub unsafe extern "C" fn isocoat_world_set_pair_filter(
     // SAFETY: NULL or a live world.
     unsafe { write(world, set) }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::Kind;
+    use crate::capi::body::{isocoat_body_create, isocoat_body_desc_init, isocoat_body_is_enabled};
+    use crate::capi::report::isocoat_world_get_contacts;
+    use crate::capi::status::{ISOCOAT_ERROR_POISONED, ISOCOAT_OK, isocoat_last_error};
+    use crate::math::Pose;
+    use crate::world::{BodyDesc, LinkDesc, SkeletonDesc};
+    use std::ptr::null_mut;
+
+    /// Two overlapping balls, and a pair filter that fails as only a fault of the library could.
+    fn faulty_world() -> *mut isocoat_world {
+        let mut world = World::new(WorldDesc::default()).unwrap();
+        for (kind, height) in [(Kind::Fixed, 0.0), (Kind::PointMass, 0.15)] {
+            let body = world.create_body(BodyDesc::default()).unwrap();
+            let desc = LinkDesc { kind, mass: 1.0, pose: Pose::at(0.0, 0.0, height), ..LinkDesc::default() };
+            let link = world.create_link(body, desc).unwrap();
+            world.create_skeleton(link, SkeletonDesc::default()).unwrap();
+        }
+        world.set_pair_filter(Some(Box::new(|_, _| panic!("the filter fell over"))));
+        Box::into_raw(Box::new(isocoat_world::new(world)))
+    }
+
+    fn poison() {
+        let world = faulty_world();
+        // SAFETY: the world lives until it is destroyed, and every other pointer is of this frame.
+        unsafe {
+            assert_eq!(isocoat_world_step(world, 0.01), ISOCOAT_ERROR_POISONED);
+            let mut buffer = [0u8; 512];
+            let length = isocoat_last_error(buffer.as_mut_ptr().cast(), buffer.len());
+            let message = std::str::from_utf8(&buffer[..length]).unwrap();
+            assert!(message.starts_with("internal error: the filter fell over (src/capi/world.rs:"), "{message}");
+            assert!(message.ends_with("destroy it"), "{message}");
+
+            let mut desc = std::mem::zeroed();
+            assert_eq!(isocoat_body_desc_init(&mut desc, size_of_val(&desc)), ISOCOAT_OK);
+            let (mut body, mut enabled) = (isocoat_body::default(), true);
+            let (mut contacts, mut count) = (std::ptr::null(), 0);
+            let poisoned = [
+                isocoat_world_step(world, 0.01),
+                isocoat_world_set_log(world, None, null_mut()),
+                isocoat_world_get_contacts(world, &mut contacts, &mut count),
+                isocoat_body_create(world, &desc, &mut body),
+                isocoat_body_is_enabled(world, body, &mut enabled),
+            ];
+            assert_eq!(poisoned, [ISOCOAT_ERROR_POISONED; 5]);
+            assert_eq!(isocoat_world_destroy(world), ISOCOAT_OK);
+        }
+    }
+
+    /// Printing can only be seen from outside: the test runs itself again, in a process of its own.
+    #[test]
+    fn a_panic_poisons_its_world_and_only_those_of_the_host_are_printed() {
+        const INSIDE: &str = "ISOCOAT_TEST_POISON";
+        if std::env::var_os(INSIDE).is_some() {
+            poison();
+            assert!(std::panic::catch_unwind(|| panic!("the host fell over")).is_err());
+            return;
+        }
+        let name = "capi::world::tests::a_panic_poisons_its_world_and_only_those_of_the_host_are_printed";
+        let mut again = std::process::Command::new(std::env::current_exe().unwrap());
+        let output = again.args(["--exact", name, "--nocapture"]).env(INSIDE, "1").output().unwrap();
+        let (out, err) = (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap());
+        assert!(output.status.success() && out.contains("1 passed"), "{out}{err}");
+        assert!(err.contains("the host fell over") && !err.contains("the filter fell over"), "{err}");
+    }
+}

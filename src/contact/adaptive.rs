@@ -81,6 +81,8 @@ pub fn integrate(
 ) -> Result<Integrated, LeansOver> {
     let mut solver = Solver { pair, frame: Frame::new(at, [1.0, 1.0]), accept: 0.0, border_step: 0.0, evaluations: 0 };
     solver.aim(at.sum, tolerance);
+    // Solved out, so that a symmetric contact comes out symmetric: no guess from a neighbour shows.
+    solver.accept *= 1e-2;
     if !solver.fit(at, extent) {
         // No clear border along an axis: the prediction will do, the cells spread by themselves.
         let scale = solver.frame.scale.map(|s| s.min(extent));
@@ -267,21 +269,44 @@ impl Work<'_, '_> {
                 count += 1;
             }
         }
-        for index in 1..count.saturating_sub(1) {
-            let corners = [polygon[0], polygon[index], polygon[index + 1]];
-            let area = 0.5
-                * ((corners[1].0 - corners[0].0) * (corners[2].1 - corners[0].1)
-                    - (corners[2].0 - corners[0].0) * (corners[1].1 - corners[0].1));
-            for far in 0..3 {
-                let mix = |f: fn(&(f64, f64)) -> f64| {
-                    (f(&corners[0]) + f(&corners[1]) + f(&corners[2])) / 6.0 + 0.5 * f(&corners[far])
-                };
-                let (dx, dy) = (mix(|c| c.0), mix(|c| c.1));
-                let guess = cell.height + cell.slopes[0] * dx + cell.slopes[1] * dy;
-                let Some(column) = self.solver.column(cell.x + dx, cell.y + dy, guess) else { continue };
-                let node = self.solver.node(cell.x + dx, cell.y + dy, &column, area / 3.0);
-                self.workspace.pool.extend(node);
-            }
+        if count < 3 {
+            return;
+        }
+        // Triangles round the centroid, each by its edges' midpoints: of second order, and the same turned half way
+        // round, so that opposite cells of a symmetric contact balance.
+        let polygon = &polygon[..count];
+        let cross = |p: (f64, f64), q: (f64, f64)| p.0 * q.1 - p.1 * q.0;
+        let mut center = (0.0, 0.0);
+        let mut total = 0.0;
+        for index in 0..count {
+            let (p, q) = (polygon[index], polygon[(index + 1) % count]);
+            let area = cross(p, q);
+            total += area;
+            center = (center.0 + area * (p.0 + q.0), center.1 + area * (p.1 + q.1));
+        }
+        if total <= 0.0 {
+            return;
+        }
+        center = (center.0 / (3.0 * total), center.1 / (3.0 * total));
+        let triangle = |index: usize| {
+            let (p, q) = (polygon[index % count], polygon[(index + 1) % count]);
+            0.5 * cross((p.0 - center.0, p.1 - center.1), (q.0 - center.0, q.1 - center.1))
+        };
+        for index in 0..count {
+            let (p, q) = (polygon[index], polygon[(index + 1) % count]);
+            let spoke = (0.5 * (center.0 + p.0), 0.5 * (center.1 + p.1));
+            let edge = (0.5 * (p.0 + q.0), 0.5 * (p.1 + q.1));
+            self.add(cell, spoke, (triangle(index + count - 1) + triangle(index)) / 3.0);
+            self.add(cell, edge, triangle(index) / 3.0);
+        }
+    }
+
+    /// Adds the node of a place in a cell, if there is contact.
+    fn add(&mut self, cell: &Cell, (dx, dy): (f64, f64), weight: f64) {
+        let guess = cell.height + cell.slopes[0] * dx + cell.slopes[1] * dy;
+        if let Some(column) = self.solver.column(cell.x + dx, cell.y + dy, guess) {
+            let node = self.solver.node(cell.x + dx, cell.y + dy, &column, weight);
+            self.workspace.pool.extend(node);
         }
     }
 

@@ -73,6 +73,42 @@ pub struct Solver<'a> {
     pub evaluations: u32,
 }
 
+/// What the border looks like from a frame.
+enum Look {
+    /// Near enough to the unit circle.
+    Round,
+    /// The frame was changed.
+    Refitted,
+}
+
+/// A polygon's centroid, the direction of its longer principal axis, and the semi-axes of the ellipse with its second
+/// moments.
+#[expect(clippy::type_complexity, reason = "three plain figures")]
+fn moments(polygon: &[(f64, f64)]) -> Option<((f64, f64), (f64, f64), [f64; 2])> {
+    let (mut area, mut x, mut y, mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+    for (index, p) in polygon.iter().enumerate() {
+        let q = polygon[(index + 1) % polygon.len()];
+        let cross = p.0 * q.1 - q.0 * p.1;
+        area += cross / 2.0;
+        x += cross * (p.0 + q.0) / 6.0;
+        y += cross * (p.1 + q.1) / 6.0;
+        xx += cross * (p.0 * p.0 + p.0 * q.0 + q.0 * q.0) / 12.0;
+        yy += cross * (p.1 * p.1 + p.1 * q.1 + q.1 * q.1) / 12.0;
+        xy += cross * (p.0 * q.1 + 2.0 * p.0 * p.1 + 2.0 * q.0 * q.1 + q.0 * p.1) / 24.0;
+    }
+    if area <= 0.0 {
+        return None;
+    }
+    let center = (x / area, y / area);
+    let (xx, yy) = (xx / area - center.0 * center.0, yy / area - center.1 * center.1);
+    let xy = xy / area - center.0 * center.1;
+    let (mean, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
+    let radius = half.hypot(xy);
+    let angle = 0.5 * libm::atan2(xy, half);
+    let semi = |moment: f64| 2.0 * moment.max(1e-12 * mean).sqrt();
+    Some((center, (libm::cos(angle), libm::sin(angle)), [semi(mean + radius), semi(mean - radius)]))
+}
+
 /// Steepest surface that still counts as a height over the plane, as the cosine of its tilt.
 const STEEPEST: f64 = 0.12;
 
@@ -127,39 +163,57 @@ impl Solver<'_> {
         })
     }
 
-    /// Scales the frame so that the border is near the unit circle, and moves its origin to the middle of the patch where
-    /// the pressure is too flat to have a clear maximum.
+    /// Scales the frame so that the border is near the unit circle: first as the pressure's curvature predicts, then, if
+    /// that is off, by the border itself. A tilted face is deepest at its rounded edge, which tells nothing of its size.
     pub fn fit(&mut self, at: &Deepest, extent: f64) -> bool {
-        let flat = 1e-3 * at.slope / extent;
-        let mut predicted = [0.0; 2];
-        for (axis, scale) in predicted.iter_mut().enumerate() {
-            *scale = if at.curvature[axis] < -flat { (2.0 * at.sum / -at.curvature[axis]).sqrt() } else { extent };
-        }
-        let clear = |axis: usize| at.curvature[axis] < -flat && predicted[axis] < 0.5 * extent;
+        let predicted = at.curvature.map(|c| if c < 0.0 { (2.0 * at.sum / -c).sqrt().min(extent) } else { extent });
         self.frame.scale = predicted;
-        if clear(0) && clear(1) {
-            return true;
-        }
-        // Two rounds: the middle across the first axis depends on where the second one ends.
-        for _ in 0..2 {
-            for axis in 0..2 {
-                if clear(axis) {
-                    continue;
-                }
-                let mut ends = [0.0; 2];
-                for (end, sign) in ends.iter_mut().zip([1.0, -1.0]) {
-                    let direction = if axis == 0 { (sign, 0.0) } else { (0.0, sign) };
-                    let Some((s, _)) = self.border(direction, at.sum, 0.0) else { return false };
-                    *end = s * sign;
-                }
-                let middle = 0.5 * (ends[0] + ends[1]);
-                let (x, y) = if axis == 0 { (middle, 0.0) } else { (0.0, middle) };
-                let Some(column) = self.column(x, y, 0.0) else { return false };
-                self.frame.origin = self.frame.point(x, y, column.height);
-                self.frame.scale[axis] *= 0.5 * (ends[0] - ends[1]);
+        for _ in 0..4 {
+            match self.look_round(at.sum) {
+                Some(Look::Round) => return true,
+                Some(Look::Refitted) => {}
+                None => return false,
             }
         }
         true
+    }
+
+    /// Finds the border at eight azimuths; where it is far from the unit circle, moves the frame to the middle of what
+    /// they enclose, with its principal axes and sizes.
+    fn look_round(&mut self, peak: f64) -> Option<Look> {
+        const COUNT: usize = 8;
+        let mut polygon = [(0.0, 0.0); COUNT];
+        let (mut nearest, mut farthest, mut height) = (f64::INFINITY, 0.0f64, 0.0);
+        for (index, corner) in polygon.iter_mut().enumerate() {
+            let angle = 2.0 * std::f64::consts::PI * index as f64 / COUNT as f64;
+            let direction = (libm::cos(angle), libm::sin(angle));
+            let (s, z) = self.border(direction, peak, height)?;
+            // Opposite borders of a round patch are as high; else start level again.
+            height = if (0.7..1.4).contains(&s) { z } else { 0.0 };
+            *corner = (direction.0 * s * self.frame.scale[0], direction.1 * s * self.frame.scale[1]);
+            nearest = nearest.min(s);
+            farthest = farthest.max(s);
+            if index == 3 && (0.8..1.25).contains(&nearest) && (0.8..1.25).contains(&farthest) {
+                // Half way round as predicted: the rest will be too, or the estimate will tell.
+                return Some(Look::Round);
+            }
+        }
+        if nearest > 0.6 && farthest < 1.7 {
+            return Some(Look::Round);
+        }
+        let (center, axes, scale) = moments(&polygon)?;
+        let (x, y) = (center.0 / self.frame.scale[0], center.1 / self.frame.scale[1]);
+        let column = self.column(x, y, 0.0)?;
+        if column.sum <= 0.0 {
+            return None;
+        }
+        let origin = self.frame.point(x, y, column.height);
+        let normal = column.sample.normal()?;
+        let old = self.frame;
+        let u = old.u * axes.0 + old.v * axes.1;
+        let u = (u - normal * u.dot(&normal)).normalize();
+        self.frame = Frame { origin, normal, u, v: normal.cross(&u), scale };
+        Some(Look::Refitted)
     }
 
     /// The border along a direction of the frame: its radius and height. Newton on `Φ = σ = 0` in the half-plane, kept

@@ -13,20 +13,26 @@ use crate::field::Shape;
 struct Footprint {
     face: f64,
     edge: f64,
+    /// Length of its longest side.
+    length: f64,
 }
 
 fn footprint(shape: &Shape) -> Option<Footprint> {
     match shape {
-        Shape::Point(_) => Some(Footprint { face: 0.0, edge: 0.0 }),
-        Shape::Segment(a, b) => Some(Footprint { face: 0.0, edge: 2.0 * (b - a).norm() }),
+        Shape::Point(_) => Some(Footprint { face: 0.0, edge: 0.0, length: 0.0 }),
+        Shape::Segment(a, b) => {
+            let length = (b - a).norm();
+            Some(Footprint { face: 0.0, edge: 2.0 * length, length })
+        }
         Shape::Triangle(a, b, c) => Some(Footprint {
             face: 0.5 * (b - a).cross(&(c - a)).norm(),
             edge: (b - a).norm() + (c - b).norm() + (a - c).norm(),
+            length: (b - a).norm().max((c - b).norm()).max((a - c).norm()),
         }),
         Shape::Box { half, .. } => {
             let mut sides = [2.0 * half.x, 2.0 * half.y, 2.0 * half.z];
             sides.sort_by(f64::total_cmp);
-            Some(Footprint { face: sides[1] * sides[2], edge: 2.0 * (sides[1] + sides[2]) })
+            Some(Footprint { face: sides[1] * sides[2], edge: 2.0 * (sides[1] + sides[2]), length: sides[2] })
         }
         Shape::Plane { .. } => None,
     }
@@ -37,8 +43,8 @@ fn footprint(shape: &Shape) -> Option<Footprint> {
 pub struct Reachable {
     /// Normal stiffness \[N/m\].
     pub stiffness: f64,
-    /// Square of the lever that the patch's own size gives it on a turn \[m²\].
-    pub lever2: f64,
+    /// Square of the patch's radius of gyration: the lever that its own size gives it on a turn \[m²\].
+    pub gyration2: f64,
 }
 
 /// Bounds for skeletons `i` and `j` when their coats overlap by at most `overlap`.
@@ -67,7 +73,9 @@ pub fn reachable(pair: &Pair, i: usize, j: usize, overlap: f64) -> Reachable {
     };
     let (ga, gb) = (slope(&pair.a, i), slope(&pair.b, j));
     let series = 1.0 / (1.0 / ga + 1.0 / gb);
-    let round = |shape: &Shape| matches!(shape, Shape::Point(_));
-    let lever2 = if round(&a.shape) || round(&b.shape) { 0.0 } else { 0.25 * area };
-    Reachable { stiffness: series * area, lever2 }
+    // A uniform bar of this length with round ends; no patch is longer than the shorter of the two.
+    let length = |shape: &Shape| footprint(shape).map_or(f64::INFINITY, |f| f.length);
+    let length = length(&a.shape).min(length(&b.shape));
+    let gyration2 = if length > 0.0 { (length + 2.0 * c).powi(2) / 12.0 } else { 0.0 };
+    Reachable { stiffness: series * area, gyration2 }
 }

@@ -104,8 +104,10 @@ fn demand(pair: &Pair, motions: &[Motion], dt: f64) -> (f64, f64) {
                 let mobility = |link: u32| {
                     let motion = &motions[link as usize];
                     let arm = approach.meeting - (motion.center - pair.origin);
-                    let lever2 = arm.cross(&approach.direction).norm_squared() + bound.lever2;
-                    motion.inverse_mass() + lever2 * motion.inverse_moment()
+                    // A patch below the centre of mass rocks apart from heaving: the faster of the two counts.
+                    let heave =
+                        motion.inverse_mass() + arm.cross(&approach.direction).norm_squared() * motion.inverse_moment();
+                    heave.max(bound.gyration2 * motion.inverse_moment())
                 };
                 bound.stiffness * (mobility(pair.a.links[i]) + mobility(pair.b.links[j]))
             };

@@ -54,16 +54,7 @@ impl World {
     pub(super) fn bounds_of(&self, index: usize, motions: &[Motion], dt: f64) -> Option<Bounds> {
         let mut bounds: Option<(Vec3, Vec3)> = None;
         for (link, _, skeleton) in self.skeletons_of(&self.bodies[index]) {
-            let motion = &motions[link as usize];
-            let pose = motion.pose();
-            let (mut low, mut high) = skeleton.desc.shape.transformed(&pose).bounds(skeleton.reach);
-            // Translation goes one way; turning and acceleration may go any.
-            let path = motion.twist.linear * dt;
-            let size = (high - low).norm() + (pose.position - motion.center).norm();
-            let any = 0.5 * motion.acceleration.norm() * dt * dt
-                + (motion.twist.angular.norm() * dt).min(2.0) * if size.is_finite() { size } else { 0.0 };
-            low += path.inf(&Vec3::zeros()) - Vec3::repeat(any);
-            high += path.sup(&Vec3::zeros()) + Vec3::repeat(any);
+            let (low, high) = swept(&skeleton.desc.shape, skeleton.reach, &motions[link as usize], dt);
             bounds = Some(bounds.map_or((low, high), |(l, h)| (l.inf(&low), h.sup(&high))));
         }
         bounds.map(|(low, high)| Bounds { low, high, body: index as u32 })
@@ -76,6 +67,7 @@ impl World {
         motions: &[Motion],
         bounds: [&Bounds; 2],
         scheme: Scheme,
+        dt: f64,
     ) -> bool {
         let [a, b] = candidate.bodies.map(|body| &self.bodies[body as usize]);
         if a.desc.rigid && b.desc.rigid {
@@ -84,8 +76,8 @@ impl World {
         // The automatic choice may have to fall back on seeds.
         let seeds = matches!(scheme, Scheme::Auto | Scheme::Adaptive | Scheme::Polar | Scheme::Seeds);
         let region = (bounds[0].low.sup(&bounds[1].low), bounds[0].high.inf(&bounds[1].high));
-        self.fill_side(&mut candidate.pair.a, a, motions, &region, seeds);
-        self.fill_side(&mut candidate.pair.b, b, motions, &region, seeds);
+        self.fill_side(&mut candidate.pair.a, a, motions, &region, seeds, dt);
+        self.fill_side(&mut candidate.pair.b, b, motions, &region, seeds, dt);
         if candidate.pair.a.locals.is_empty() || candidate.pair.b.locals.is_empty() {
             return false;
         }
@@ -98,15 +90,14 @@ impl World {
         true
     }
 
-    fn fill_side(&self, side: &mut Side, body: &Body, motions: &[Motion], region: &(Vec3, Vec3), seeds: bool) {
+    fn fill_side(&self, side: &mut Side, body: &Body, motions: &[Motion], region: &(Vec3, Vec3), seeds: bool, dt: f64) {
         side.clear();
         side.isovalue = body.desc.isovalue;
         side.stiffness_scale = body.desc.stiffness_scale;
         side.rigid = body.desc.rigid;
         for (link, index, skeleton) in self.skeletons_of(body) {
             let shape = skeleton.desc.shape;
-            let pose = motions[link as usize].pose();
-            let (low, high) = shape.transformed(&pose).bounds(skeleton.profile.radius);
+            let (low, high) = swept(&shape, skeleton.profile.radius, &motions[link as usize], dt);
             if (0..3).any(|axis| low[axis] > region.1[axis] || region.0[axis] > high[axis]) {
                 continue;
             }
@@ -144,6 +135,18 @@ impl Skeleton {
         let (made_for, rays) = self.rays.get_or_init(make);
         if *made_for == count { rays.clone() } else { make().1 }
     }
+}
+
+/// Bounds of a shape grown by `margin`, over a step of `dt` in which its link moves.
+fn swept(shape: &Shape, margin: f64, motion: &Motion, dt: f64) -> (Vec3, Vec3) {
+    let pose = motion.pose();
+    let (low, high) = shape.transformed(&pose).bounds(margin);
+    // Translation goes one way; turning and acceleration may go any.
+    let path = motion.twist.linear * dt;
+    let size = (high - low).norm() + (pose.position - motion.center).norm();
+    let turned = if size.is_finite() { (motion.twist.angular.norm() * dt).min(2.0) * size } else { 0.0 };
+    let any = Vec3::repeat(0.5 * motion.acceleration.norm() * dt * dt + turned);
+    (low + path.inf(&Vec3::zeros()) - any, high + path.sup(&Vec3::zeros()) + any)
 }
 
 /// What two bodies make of their surfaces (the rules are those of [`BodyDesc`](super::BodyDesc)).

@@ -3,7 +3,7 @@
 use super::{BodyId, LinkId, SkeletonId, World};
 use crate::coat::{Coat, seeds, territory};
 use crate::error::{Error, Result, out_of_range, require, require_finite};
-use crate::field::blend;
+use crate::field::lanes;
 use crate::math::Vec3;
 use crate::surface::{SurfaceHit, closest, ray};
 
@@ -107,8 +107,8 @@ impl World {
         &self,
         body: BodyId,
         points: &[[f64; 3]],
-        mut values: Option<&mut [f64]>,
-        mut gradients: Option<&mut [[f64; 3]]>,
+        values: Option<&mut [f64]>,
+        gradients: Option<&mut [[f64; 3]]>,
     ) -> Result<()> {
         self.bodies.get(body)?;
         let lengths = [values.as_ref().map(|out| out.len()), gradients.as_ref().map(|out| out.len())];
@@ -119,16 +119,8 @@ impl World {
             return Err(out_of_range("point", format_args!("({}, {}, {})", p[0], p[1], p[2]), "finite"));
         }
         let snapshot = self.snapshot(body.index());
-        for (k, point) in points.iter().enumerate() {
-            let local = snapshot.localise(&Vec3::from(*point));
-            let (value, gradient) = blend::value_gradient(&snapshot.coat.skeletons, &local);
-            if let Some(values) = &mut values {
-                values[k] = value;
-            }
-            if let Some(gradients) = &mut gradients {
-                gradients[k] = gradient.into();
-            }
-        }
+        let local: Vec<[f64; 3]> = points.iter().map(|p| snapshot.localise(&Vec3::from(*p)).into()).collect();
+        lanes::evaluate(&snapshot.coat.skeletons, &local, values, gradients);
         Ok(())
     }
 

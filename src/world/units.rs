@@ -67,7 +67,7 @@ fn carried(placed: &Placed, slope: f64) -> f64 {
     let t = placed.profile.thickness;
     let sink = SINK * t;
     // Corners, edges and faces on the floor: ∫ of the pressure under a ball, a cylinder (chord law) and a plane.
-    let corner = PI * slope * sink * sink * (t - sink / 3.0);
+    let corner = PI * slope * sink * sink * (t - 2.0 * sink / 3.0);
     let edge = slope * (4.0 / 3.0) * sink * (2.0 * t * sink).sqrt();
     match &placed.shape {
         Shape::Point(_) => corner,

@@ -129,9 +129,7 @@ impl Oracle {
                     for step in 0..=STEPS {
                         let s = step as f64 / STEPS as f64;
                         let hidden = step > 0 && step < STEPS && samples[step] <= 0.0;
-                        // A hump rises no further above a sample than its neighbours lie below it.
-                        let top_at_most = |other: f64| samples[step] >= other && 2.0 * samples[step] > other;
-                        if hidden && top_at_most(samples[step - 1]) && top_at_most(samples[step + 1]) {
+                        if hidden && samples[step] >= samples[step - 1] && samples[step] >= samples[step + 1] {
                             let top = climb(&positive, s - 1.0 / STEPS as f64, s + 1.0 / STEPS as f64);
                             if positive(top) > 0.0 {
                                 if top < s {

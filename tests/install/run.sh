@@ -56,7 +56,7 @@ prefix=$WORK/moved
 export PKG_CONFIG_PATH="$prefix/lib/pkgconfig"
 
 # What a program or library may load besides isocoat itself.
-plain_libraries='lib(c|m|gcc_s|stdc\+\+|dl|rt|util|pthread)\.so\.[0-9]+|ld-linux[-a-z0-9_]*\.so\.[0-9]+|linux-vdso\.so\.1'
+plain_libraries='(lib(c|m|gcc_s|stdc\+\+|dl|rt|util|pthread)|ld-linux[-a-z0-9_]*|linux-vdso)\.so\.[0-9]+'
 check_libraries() { # file, the isocoat it should load, or nothing
     ldd "$1" | awk '{ print ($2 == "=>") ? $1 " " $3 : $1 }' | while read -r name path; do
         case $name in
@@ -86,19 +86,21 @@ build_and_run() { # name, package, expected library, extra flags for pkg-config 
 }
 
 say "each header alone, in the strictest mode of the compiler"
-for header in isocoat.h isocoat.hpp; do
-    case $header in
-    *.h) language="$CC $c_flags -x c" ;;
-    *) language="$CXX $cxx_flags -x c++" ;;
-    esac
-    # Twice, for the guard.
-    printf '#include <isocoat/%s>\n#include <isocoat/%s>\n' $header $header |
-        $language -I "$prefix/include" -fsyntax-only -
-done
+# Included twice, for the guard.
+alone() { # header, compiler line
+    header=$1 && shift
+    printf '#include <isocoat/%s>\n#include <isocoat/%s>\n' "$header" "$header" |
+        "$@" -I "$prefix/include" -fsyntax-only -
+}
+# shellcheck disable=SC2086
+{
+    for standard in c99 c11 c17; do alone isocoat.h "$CC" $c_flags -std=$standard -x c; done
+    for standard in c++11 c++17 c++20; do alone isocoat.h "$CXX" $cxx_flags -std=$standard -x c++; done
+    for standard in c++17 c++20; do alone isocoat.hpp "$CXX" $cxx_flags -std=$standard -x c++; done
+}
 for precision in bullet bullet-float64; do
-    # shellcheck disable=SC2046
-    printf '#include <isocoat/isocoat_bullet.hpp>\n' | $CXX $cxx_flags -I "$prefix/include" \
-        $($PKG_CONFIG --cflags $precision | sed 's/-I/-isystem /g') -x c++ -fsyntax-only -
+    # shellcheck disable=SC2046,SC2086
+    alone isocoat_bullet.hpp "$CXX" $cxx_flags $($PKG_CONFIG --cflags $precision | sed 's/-I/-isystem /g') -x c++
 done
 
 say "pkg-config, shared"

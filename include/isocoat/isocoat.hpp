@@ -1,0 +1,540 @@
+/*
+ * isocoat for C++17: the C API (isocoat.h, where units, ranges and rules stand) with owners, exceptions and ranges.
+ *
+ * SPDX-License-Identifier: MIT OR Apache-2.0
+ *
+ *     isocoat::world world;
+ *     isocoat::body ball = world.create_body();
+ *     isocoat::link link = ball.create_link(link_desc);
+ *     link.create_skeleton(skeleton_desc);
+ *     world.step(1.0 / 60.0);
+ *     for (const isocoat::contact &contact : world.contacts()) { ... }
+ *
+ * A world owns; body, link and skeleton are values that name something in it, as the C handles do: copying one copies
+ * no body, and dropping one destroys nothing. A call that fails throws isocoat::error and has changed nothing.
+ */
+#ifndef ISOCOAT_HPP
+#define ISOCOAT_HPP
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <exception>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include <isocoat/isocoat.h>
+
+namespace isocoat {
+
+using vec3 = std::array<double, 3>;
+using mat3 = std::array<double, 9>; /* row by row */
+
+using pose = isocoat_pose;
+using wrench = isocoat_wrench;
+using link_state = isocoat_link_state;
+using contact = isocoat_contact;
+using event = isocoat_event;
+using counters = isocoat_counters;
+using ray_hit = isocoat_ray_hit;
+using surface_point = isocoat_surface_point;
+
+/* The status of a call that failed; what() says what was wrong, with the value and the range. */
+class error : public std::runtime_error {
+public:
+    error(isocoat_status status, const std::string &message) : std::runtime_error(message), status_(status) {}
+
+    isocoat_status status() const noexcept { return status_; }
+
+private:
+    isocoat_status status_;
+};
+
+/* Throws the last error of this thread unless the status is ISOCOAT_OK. */
+inline void check(isocoat_status status)
+{
+    if (status == ISOCOAT_OK) return;
+    std::string message(isocoat_last_error(nullptr, 0), '\0');
+    isocoat_last_error(message.data(), message.size() + 1);
+    throw error(status, message);
+}
+
+/* Throws when the library that runs does not fit the headers. Call it once at the start. */
+inline void check_abi() { check(isocoat_check_abi()); }
+
+/* Some elements in a row, not owned; what std::span is from C++20 on. */
+template <class T>
+class span {
+public:
+    constexpr span() noexcept = default;
+    constexpr span(T *data, std::size_t size) noexcept : data_(data), size_(size) {}
+    /* From anything with data() and size(), such as a std::vector or a std::array. */
+    template <class C, class = std::enable_if_t<std::is_convertible_v<decltype(std::declval<C &>().data()), T *>>>
+    constexpr span(C &&container) noexcept : data_(container.data()), size_(container.size())
+    {
+    }
+
+    constexpr T *data() const noexcept { return data_; }
+    constexpr std::size_t size() const noexcept { return size_; }
+    constexpr bool empty() const noexcept { return size_ == 0; }
+    constexpr T *begin() const noexcept { return data_; }
+    constexpr T *end() const noexcept { return data_ + size_; }
+    constexpr T &operator[](std::size_t index) const { return data_[index]; }
+
+private:
+    T *data_ = nullptr;
+    std::size_t size_ = 0;
+};
+
+/* Where a bulk call writes; stride is in bytes, 0 for elements without gaps. A default isocoat_buffer is skipped. */
+inline isocoat_buffer buffer(double *data, std::size_t stride = 0) { return {data, stride, ISOCOAT_FORMAT_F64}; }
+inline isocoat_buffer buffer(float *data, std::size_t stride = 0) { return {data, stride, ISOCOAT_FORMAT_F32}; }
+
+namespace detail {
+
+/* Reads one thing: function(arguments..., &value) as in the C API. */
+template <class T, class Function, class... Arguments>
+T read(T value, Function function, Arguments... arguments)
+{
+    check(function(arguments..., &value));
+    return value;
+}
+
+/* Reads a list whose length only the library knows: get(first, capacity, count) as in the C API. */
+template <class T, class Get>
+std::vector<T> list(Get get)
+{
+    std::size_t count = 0;
+    check(get(nullptr, std::size_t{0}, &count));
+    std::vector<T> items(count);
+    if (count > 0) check(get(items.data(), items.size(), &count));
+    items.resize(count);
+    return items;
+}
+
+/* Names the raw handles of a list in their world. */
+template <class Named, class Raw>
+std::vector<Named> name(isocoat_world *world, const std::vector<Raw> &raw)
+{
+    std::vector<Named> named;
+    named.reserve(raw.size());
+    for (const Raw &handle : raw) named.emplace_back(world, handle);
+    return named;
+}
+
+/* What the three nouns share: a world and a handle. */
+template <class Raw>
+class noun {
+public:
+    noun() = default;
+    noun(isocoat_world *world, Raw raw) noexcept : world_(world), raw_(raw) {}
+
+    /* The handle of the C API. */
+    Raw raw() const noexcept { return raw_; }
+    explicit operator bool() const noexcept { return raw_.generation != 0; }
+    friend bool operator==(const noun &a, const noun &b) noexcept
+    {
+        return a.world_ == b.world_ && a.raw_.index == b.raw_.index && a.raw_.generation == b.raw_.generation;
+    }
+    friend bool operator!=(const noun &a, const noun &b) noexcept { return !(a == b); }
+
+protected:
+    isocoat_world *world_ = nullptr;
+    Raw raw_ = {};
+};
+
+} // namespace detail
+
+/* The seeds of a skeleton: one element each in the three. */
+struct seed_list {
+    std::vector<vec3> positions;
+    std::vector<vec3> normals;
+    std::vector<std::uint8_t> valid; /* 1 on the surface, 0 where another territory was met */
+};
+
+class link;
+
+/* A primitive fixed in a link's frame, and the field it emits. */
+class skeleton : public detail::noun<isocoat_skeleton> {
+public:
+    using noun::noun;
+
+    void destroy() { check(isocoat_skeleton_destroy(world_, raw_)); }
+    isocoat_skeleton_desc desc() const
+    {
+        return detail::read(isocoat_skeleton_desc_default(), isocoat_skeleton_get_desc, world_, raw_);
+    }
+    void set_desc(const isocoat_skeleton_desc &desc) { check(isocoat_skeleton_set_desc(world_, raw_, &desc)); }
+    bool is_enabled() const { return detail::read(false, isocoat_skeleton_is_enabled, world_, raw_); }
+    void set_enabled(bool enabled) { check(isocoat_skeleton_set_enabled(world_, raw_, enabled)); }
+    void *user_data() const { return detail::read<void *>(nullptr, isocoat_skeleton_get_user_data, world_, raw_); }
+    /* The link that carries it. */
+    link parent() const;
+    seed_list seeds() const
+    {
+        std::size_t count = 0;
+        check(isocoat_skeleton_get_seeds(world_, raw_, {}, {}, nullptr, 0, &count));
+        seed_list list{std::vector<vec3>(count), std::vector<vec3>(count), std::vector<std::uint8_t>(count)};
+        if (count > 0) {
+            check(isocoat_skeleton_get_seeds(world_, raw_, buffer(list.positions.front().data()),
+                                             buffer(list.normals.front().data()), list.valid.data(), count, &count));
+        }
+        return list;
+    }
+};
+
+class body;
+
+/* One moving frame of a body. */
+class link : public detail::noun<isocoat_link> {
+public:
+    using noun::noun;
+
+    void destroy() { check(isocoat_link_destroy(world_, raw_)); }
+    isocoat_link_desc desc() const
+    {
+        return detail::read(isocoat_link_desc_default(), isocoat_link_get_desc, world_, raw_);
+    }
+    void set_desc(const isocoat_link_desc &desc) { check(isocoat_link_set_desc(world_, raw_, &desc)); }
+    bool is_enabled() const { return detail::read(false, isocoat_link_is_enabled, world_, raw_); }
+    void set_enabled(bool enabled) { check(isocoat_link_set_enabled(world_, raw_, enabled)); }
+    void *user_data() const { return detail::read<void *>(nullptr, isocoat_link_get_user_data, world_, raw_); }
+    /* The body it belongs to. */
+    body parent() const;
+    skeleton create_skeleton(const isocoat_skeleton_desc &desc)
+    {
+        return {world_, detail::read(isocoat_skeleton{}, isocoat_skeleton_create, world_, raw_, &desc)};
+    }
+    std::vector<skeleton> skeletons() const
+    {
+        return detail::name<skeleton>(world_, detail::list<isocoat_skeleton>([this](auto... list) {
+            return isocoat_link_get_skeletons(world_, raw_, list...);
+        }));
+    }
+
+    link_state state() const { return detail::read(link_state{}, isocoat_link_get_state, world_, raw_); }
+    void set_state(const link_state &state) { check(isocoat_link_set_state(world_, raw_, &state)); }
+    void teleport(const link_state &state) { check(isocoat_link_teleport(world_, raw_, &state)); }
+    /* Mean contact force and torque over the last step. */
+    isocoat::wrench wrench() const { return detail::read(isocoat::wrench{}, isocoat_link_get_wrench, world_, raw_); }
+    /* What the host is to apply to a host-driven link before it advances it. */
+    isocoat::wrench impulse() const
+    {
+        return detail::read(isocoat::wrench{}, isocoat_link_get_impulse, world_, raw_);
+    }
+    /* At the centre of mass, or at a point of the world. */
+    void apply_force(const vec3 &force) { check(isocoat_link_apply_force(world_, raw_, force.data(), nullptr)); }
+    void apply_force(const vec3 &force, const vec3 &point)
+    {
+        check(isocoat_link_apply_force(world_, raw_, force.data(), point.data()));
+    }
+    void apply_torque(const vec3 &torque) { check(isocoat_link_apply_torque(world_, raw_, torque.data())); }
+    void apply_impulse(const vec3 &impulse)
+    {
+        check(isocoat_link_apply_impulse(world_, raw_, impulse.data(), nullptr));
+    }
+    void apply_impulse(const vec3 &impulse, const vec3 &point)
+    {
+        check(isocoat_link_apply_impulse(world_, raw_, impulse.data(), point.data()));
+    }
+    void apply_angular_impulse(const vec3 &impulse)
+    {
+        check(isocoat_link_apply_angular_impulse(world_, raw_, impulse.data()));
+    }
+    void set_external_acceleration(const vec3 &linear, const vec3 &angular)
+    {
+        check(isocoat_link_set_external_acceleration(world_, raw_, linear.data(), angular.data()));
+    }
+};
+
+/* One deformable or rigid object: a base of links, and a coat. */
+class body : public detail::noun<isocoat_body> {
+public:
+    using noun::noun;
+
+    void destroy() { check(isocoat_body_destroy(world_, raw_)); }
+    isocoat_body_desc desc() const
+    {
+        return detail::read(isocoat_body_desc_default(), isocoat_body_get_desc, world_, raw_);
+    }
+    void set_desc(const isocoat_body_desc &desc) { check(isocoat_body_set_desc(world_, raw_, &desc)); }
+    bool is_enabled() const { return detail::read(false, isocoat_body_is_enabled, world_, raw_); }
+    void set_enabled(bool enabled) { check(isocoat_body_set_enabled(world_, raw_, enabled)); }
+    void *user_data() const { return detail::read<void *>(nullptr, isocoat_body_get_user_data, world_, raw_); }
+    link create_link(const isocoat_link_desc &desc)
+    {
+        return {world_, detail::read(isocoat_link{}, isocoat_link_create, world_, raw_, &desc)};
+    }
+    std::vector<link> links() const
+    {
+        return detail::name<link>(world_, detail::list<isocoat_link>([this](auto... list) {
+            return isocoat_body_get_links(world_, raw_, list...);
+        }));
+    }
+
+    /* The field at many points; values and gradients are as long as points, or empty when not wanted. */
+    void evaluate_field(span<const vec3> points, span<double> values, span<vec3> gradients = {}) const
+    {
+        if ((!values.empty() && values.size() != points.size()) ||
+            (!gradients.empty() && gradients.size() != points.size()))
+            throw error(ISOCOAT_ERROR_INVALID_ARGUMENT, "values and gradients must be as long as points, or empty");
+        check(isocoat_body_evaluate_field(world_, raw_, points.empty() ? nullptr : points.data()->data(),
+                                          points.size(), values.data(),
+                                          gradients.empty() ? nullptr : gradients.data()->data()));
+    }
+    /* The field at one point. */
+    double field(const vec3 &point) const
+    {
+        double value = 0.0;
+        check(isocoat_body_evaluate_field(world_, raw_, point.data(), 1, &value, nullptr));
+        return value;
+    }
+    /* The closest point of the surface; none for a body without enabled skeletons. */
+    std::optional<surface_point> closest_point(const vec3 &point) const
+    {
+        surface_point closest{};
+        bool found = false;
+        check(isocoat_body_closest_point(world_, raw_, point.data(), &closest, &found));
+        return found ? std::optional<surface_point>(closest) : std::nullopt;
+    }
+};
+
+inline link skeleton::parent() const
+{
+    return {world_, detail::read(isocoat_link{}, isocoat_skeleton_get_link, world_, raw_)};
+}
+
+inline body link::parent() const
+{
+    return {world_, detail::read(isocoat_body{}, isocoat_link_get_body, world_, raw_)};
+}
+
+/* Owns everything. Movable, not copyable; bodies, links and skeletons stay valid when their world is moved. */
+class world {
+public:
+    using log_function = std::function<void(isocoat_log_level, const char *)>;
+    using pair_filter = std::function<bool(isocoat_body, isocoat_body)>;
+    using line_function = std::function<void(const double *a, const double *b, std::uint32_t color)>;
+    using point_function = std::function<void(const double *position, double size, std::uint32_t color)>;
+
+    explicit world(const isocoat_world_desc &desc = isocoat_world_desc_default())
+    {
+        isocoat_world *created = nullptr;
+        check(isocoat_world_create(&desc, &created));
+        world_.reset(created);
+    }
+
+    /* The world of the C API; it still belongs to this. */
+    isocoat_world *get() const noexcept { return world_.get(); }
+
+    isocoat_world_desc desc() const
+    {
+        return detail::read(isocoat_world_desc_default(), isocoat_world_get_desc, get());
+    }
+    void set_desc(const isocoat_world_desc &desc) { check(isocoat_world_set_desc(get(), &desc)); }
+
+    body create_body(const isocoat_body_desc &desc = isocoat_body_desc_default())
+    {
+        return {get(), detail::read(isocoat_body{}, isocoat_body_create, get(), &desc)};
+    }
+
+    /* Advances by dt seconds. What a callback throws comes out of here, after the step has ended. */
+    void step(double dt)
+    {
+        const isocoat_status status = isocoat_world_step(get(), dt);
+        if (callbacks_) callbacks_->rethrow();
+        check(status);
+    }
+
+    /* Contacts and events of the last step: views until the next step. */
+    span<const contact> contacts() const
+    {
+        const contact *first = nullptr;
+        std::size_t count = 0;
+        check(isocoat_world_get_contacts(get(), &first, &count));
+        return {first, count};
+    }
+    span<const event> events() const
+    {
+        const event *first = nullptr;
+        std::size_t count = 0;
+        check(isocoat_world_get_events(get(), &first, &count));
+        return {first, count};
+    }
+    isocoat::counters counters() const
+    {
+        return detail::read(isocoat_counters_default(), isocoat_world_get_counters, get());
+    }
+
+    /* An empty function takes the callback away. Calls on this world from a callback throw ISOCOAT_ERROR_LOCKED. */
+    void set_log(log_function log)
+    {
+        callbacks &all = keep_callbacks();
+        check(isocoat_world_set_log(get(), log ? &callbacks::call_log : nullptr, &all));
+        all.log = std::move(log);
+    }
+    void set_pair_filter(pair_filter filter)
+    {
+        callbacks &all = keep_callbacks();
+        check(isocoat_world_set_pair_filter(get(), filter ? &callbacks::call_filter : nullptr, &all));
+        all.filter = std::move(filter);
+    }
+
+    /* Bulk calls; links are raw handles, as link::raw() gives them. */
+    void set_link_states(span<const isocoat_link> links, span<const link_state> states)
+    {
+        if (links.size() != states.size())
+            throw error(ISOCOAT_ERROR_INVALID_ARGUMENT, "links and states must be of one length");
+        check(isocoat_world_set_link_states(get(), links.data(), states.data(), links.size()));
+    }
+    void get_link_states(span<const isocoat_link> links, isocoat_buffer positions, isocoat_buffer orientations) const
+    {
+        check(isocoat_world_get_link_states(get(), links.data(), links.size(), positions, orientations));
+    }
+    void get_link_wrenches(span<const isocoat_link> links, isocoat_buffer forces, isocoat_buffer torques) const
+    {
+        check(isocoat_world_get_link_wrenches(get(), links.data(), links.size(), forces, torques));
+    }
+    void get_link_impulses(span<const isocoat_link> links, isocoat_buffer linear, isocoat_buffer angular) const
+    {
+        check(isocoat_world_get_link_impulses(get(), links.data(), links.size(), linear, angular));
+    }
+
+    /* The contacts that two bodies would have at their present poses. */
+    std::vector<contact> collide(const body &a, const body &b, isocoat_scheme scheme = ISOCOAT_SCHEME_AUTO,
+                                 double tolerance = 5e-3) const
+    {
+        return detail::list<contact>([&](auto... list) {
+            return isocoat_world_collide(get(), a.raw(), b.raw(), scheme, tolerance, list...);
+        });
+    }
+    std::optional<ray_hit> cast_ray(const vec3 &origin, const vec3 &direction, double max_distance,
+                                    std::uint64_t mask = UINT64_MAX) const
+    {
+        ray_hit hit{};
+        bool found = false;
+        check(isocoat_world_cast_ray(get(), origin.data(), direction.data(), max_distance, mask, &hit, &found));
+        return found ? std::optional<ray_hit>(hit) : std::nullopt;
+    }
+    std::vector<body> overlap_sphere(const vec3 &center, double radius, std::uint64_t mask = UINT64_MAX) const
+    {
+        return detail::name<body>(get(), detail::list<isocoat_body>([&](auto... list) {
+            return isocoat_world_overlap_sphere(get(), center.data(), radius, mask, list...);
+        }));
+    }
+
+    /* Draws into two functions, either of which may be empty. What they throw comes out of here. */
+    void debug_draw(isocoat_draw_flags flags, const line_function &line, const point_function &point) const
+    {
+        drawing sink{line, point, nullptr};
+        isocoat_debug_draw draw = isocoat_debug_draw_default();
+        draw.flags = flags;
+        draw.context = &sink;
+        if (line) draw.draw_line = &drawing::call_line;
+        if (point) draw.draw_point = &drawing::call_point;
+        const isocoat_status status = isocoat_world_debug_draw(get(), &draw);
+        if (sink.thrown) std::rethrow_exception(sink.thrown);
+        check(status);
+    }
+
+private:
+    /* Keeps the host's functions at one address, and what they throw out of the library's way. */
+    struct callbacks {
+        log_function log;
+        pair_filter filter;
+        std::exception_ptr thrown;
+
+        static void call_log(void *context, isocoat_log_level level, const char *message)
+        {
+            callbacks &self = *static_cast<callbacks *>(context);
+            try {
+                self.log(level, message);
+            } catch (...) {
+                self.thrown = std::current_exception();
+            }
+        }
+        static bool call_filter(void *context, isocoat_body a, isocoat_body b)
+        {
+            callbacks &self = *static_cast<callbacks *>(context);
+            try {
+                return self.filter(a, b);
+            } catch (...) {
+                self.thrown = std::current_exception();
+                return false;
+            }
+        }
+        void rethrow()
+        {
+            if (thrown) std::rethrow_exception(std::exchange(thrown, nullptr));
+        }
+    };
+
+    struct drawing {
+        const line_function &line;
+        const point_function &point;
+        std::exception_ptr thrown;
+
+        static void call_line(void *context, const double *a, const double *b, std::uint32_t color)
+        {
+            drawing &self = *static_cast<drawing *>(context);
+            try {
+                if (!self.thrown) self.line(a, b, color);
+            } catch (...) {
+                self.thrown = std::current_exception();
+            }
+        }
+        static void call_point(void *context, const double *position, double size, std::uint32_t color)
+        {
+            drawing &self = *static_cast<drawing *>(context);
+            try {
+                if (!self.thrown) self.point(position, size, color);
+            } catch (...) {
+                self.thrown = std::current_exception();
+            }
+        }
+    };
+
+    struct destroyer {
+        void operator()(isocoat_world *world) const noexcept { isocoat_world_destroy(world); }
+    };
+
+    callbacks &keep_callbacks()
+    {
+        if (!callbacks_) callbacks_ = std::make_unique<callbacks>();
+        return *callbacks_;
+    }
+
+    /* After the callbacks, so that it goes before them. */
+    std::unique_ptr<callbacks> callbacks_;
+    std::unique_ptr<isocoat_world, destroyer> world_;
+};
+
+/* Inertia tensors of solids about their centres; see the C functions. */
+inline mat3 inertia_of_sphere(double mass, double radius)
+{
+    mat3 inertia;
+    check(isocoat_inertia_of_sphere(mass, radius, inertia.data()));
+    return inertia;
+}
+inline mat3 inertia_of_box(double mass, const vec3 &half_extents)
+{
+    mat3 inertia;
+    check(isocoat_inertia_of_box(mass, half_extents.data(), inertia.data()));
+    return inertia;
+}
+inline mat3 inertia_of_capsule(double mass, double radius, double half_length)
+{
+    mat3 inertia;
+    check(isocoat_inertia_of_capsule(mass, radius, half_length, inertia.data()));
+    return inertia;
+}
+
+} // namespace isocoat
+
+#endif /* ISOCOAT_HPP */

@@ -1,0 +1,240 @@
+/* The C++ wrapper: owners, exceptions, ranges, callbacks that throw. */
+#include <isocoat/isocoat.hpp>
+
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <stdexcept>
+#include <type_traits>
+
+static int failures = 0;
+
+#define CHECK(condition)                                                                 \
+    do {                                                                                 \
+        if (!(condition)) {                                                              \
+            std::fprintf(stderr, "%s:%d: not so: %s\n", __FILE__, __LINE__, #condition); \
+            ++failures;                                                                  \
+        }                                                                                \
+    } while (0)
+
+static_assert(!std::is_copy_constructible_v<isocoat::world> && std::is_nothrow_move_constructible_v<isocoat::world>);
+static_assert(std::is_trivially_copyable_v<isocoat::body> && std::is_nothrow_default_constructible_v<isocoat::link>);
+
+static isocoat::link add_ball(isocoat::world &world, isocoat_link_kind kind, double height)
+{
+    isocoat_link_desc desc = isocoat_link_desc_default();
+    desc.kind = kind;
+    desc.mass = 1.0;
+    desc.pose.position[2] = height;
+    isocoat::link link = world.create_body().create_link(desc);
+    isocoat_skeleton_desc skeleton = isocoat_skeleton_desc_default();
+    skeleton.stiffness = 10.0;
+    skeleton.radius = 0.3;
+    link.create_skeleton(skeleton);
+    return link;
+}
+
+static isocoat::world falling_world()
+{
+    isocoat_world_desc desc = isocoat_world_desc_default();
+    desc.gravity[2] = -9.8;
+    isocoat::world world(desc);
+    add_ball(world, ISOCOAT_LINK_FIXED, 0.0);
+    add_ball(world, ISOCOAT_LINK_POINT_MASS, 0.195);
+    return world;
+}
+
+static void nouns()
+{
+    isocoat::world world;
+    isocoat::body body = world.create_body();
+    CHECK(body && !isocoat::body() && body == body && body != world.create_body());
+    isocoat::link link = body.create_link(isocoat_link_desc_default());
+    isocoat::skeleton skeleton = link.create_skeleton(isocoat_skeleton_desc_default());
+    CHECK(skeleton.parent() == link && link.parent() == body);
+    CHECK(body.links().size() == 1 && body.links()[0] == link);
+    CHECK(link.skeletons().size() == 1 && link.skeletons()[0] == skeleton);
+    CHECK(world.counters().bodies == 2 && world.counters().skeletons == 1);
+
+    isocoat_body_desc desc = body.desc();
+    desc.friction = 0.5;
+    desc.user_data = &world;
+    body.set_desc(desc);
+    CHECK(body.desc().friction == 0.5 && body.user_data() == &world && link.user_data() == nullptr);
+    body.set_enabled(false);
+    link.set_enabled(false);
+    skeleton.set_enabled(false);
+    CHECK(!body.is_enabled() && !link.is_enabled() && !skeleton.is_enabled());
+    CHECK(skeleton.desc().shape == ISOCOAT_SHAPE_POINT && skeleton.user_data() == nullptr);
+    skeleton.set_desc(skeleton.desc());
+    link.set_desc(link.desc());
+    world.set_desc(world.desc());
+
+    skeleton.destroy();
+    link.destroy();
+    body.destroy();
+    try {
+        body.is_enabled();
+        CHECK(false);
+    } catch (const isocoat::error &error) {
+        CHECK(error.status() == ISOCOAT_ERROR_INVALID_HANDLE && std::strstr(error.what(), "stale") != nullptr);
+        CHECK(error.what()[std::strlen(error.what()) - 1] != '\0');
+    }
+}
+
+static void worlds_move()
+{
+    isocoat::world first = falling_world();
+    isocoat_world *raw = first.get();
+    int calls = 0;
+    first.set_pair_filter([&calls](isocoat_body, isocoat_body) {
+        ++calls;
+        return true;
+    });
+    isocoat::world second = std::move(first);
+    CHECK(first.get() == nullptr && second.get() == raw);
+    second.step(0.01);
+    CHECK(calls > 0);
+    second = falling_world();
+    CHECK(second.counters().bodies == 2);
+}
+
+static void steps_and_views()
+{
+    isocoat::world world = falling_world();
+    CHECK(world.contacts().empty());
+    world.step(0.01);
+    CHECK(world.contacts().size() == 1 && world.events().size() == 1);
+    for (const isocoat::contact &contact : world.contacts()) CHECK(std::fabs(contact.normal[2]) > 0.99);
+    CHECK(world.events()[0].kind == ISOCOAT_EVENT_BEGIN);
+}
+
+static void what_a_callback_throws_comes_out_of_the_step()
+{
+    isocoat::world world = falling_world();
+    world.set_pair_filter([](isocoat_body, isocoat_body) -> bool { throw std::runtime_error("from the filter"); });
+    for (int i = 0; i < 2; ++i) {
+        try {
+            world.step(0.01);
+            CHECK(false);
+        } catch (const isocoat::error &) {
+            CHECK(false);
+        } catch (const std::runtime_error &error) {
+            CHECK(std::strcmp(error.what(), "from the filter") == 0);
+        }
+    }
+    isocoat_status inside = ISOCOAT_OK;
+    world.set_pair_filter([&](isocoat_body, isocoat_body) {
+        try {
+            world.step(0.01);
+        } catch (const isocoat::error &error) {
+            inside = error.status();
+        }
+        return true;
+    });
+    world.step(0.01);
+    CHECK(inside == ISOCOAT_ERROR_LOCKED);
+    world.set_pair_filter({});
+    world.step(0.01);
+
+    bool heard = false;
+    isocoat_body_desc soft = isocoat_body_desc_default();
+    soft.stiffness_scale = 1e-3;
+    isocoat::world other;
+    isocoat_world_desc desc = other.desc();
+    desc.gravity[2] = -9.8;
+    other.set_desc(desc);
+    isocoat::link link = add_ball(other, ISOCOAT_LINK_POINT_MASS, 5.0);
+    link.parent().set_desc(soft);
+    other.set_log([&](isocoat_log_level level, const char *text) {
+        heard = level == ISOCOAT_LOG_WARNING && std::strlen(text) > 0;
+    });
+    other.step(0.01);
+    CHECK(heard);
+}
+
+static void motion()
+{
+    isocoat::world world;
+    isocoat::link link = add_ball(world, ISOCOAT_LINK_POINT_MASS, 0.0);
+    link.apply_impulse({1, 0, 0});
+    link.apply_force({0, 0, 100});
+    link.apply_force({0, 0, -100}, {0, 0, 0});
+    link.apply_impulse({0, 1, 0}, {0, 0, 0});
+    world.step(0.01);
+    CHECK(std::fabs(link.state().linear_velocity[0] - 1.0) < 1e-12);
+    CHECK(std::fabs(link.state().linear_velocity[1] - 1.0) < 1e-12);
+    CHECK(link.wrench().force[0] == 0.0 && link.impulse().force[0] == 0.0);
+    link.set_external_acceleration({0, 0, 1}, {0, 0, 0});
+    isocoat::link_state state = link.state();
+    state.pose.position[0] = 5.0;
+    link.set_state(state);
+    link.teleport(state);
+    CHECK(link.state().pose.position[0] == 5.0);
+
+    std::vector<isocoat_link> links{link.raw()};
+    std::vector<isocoat::link_state> states{state};
+    states[0].pose.position[1] = 6.0;
+    world.set_link_states(links, states);
+    std::array<float, 3> position{};
+    isocoat::vec3 force{};
+    world.get_link_states(links, isocoat::buffer(position.data()), {});
+    world.get_link_wrenches(links, isocoat::buffer(force.data()), {});
+    world.get_link_impulses(links, {}, isocoat::buffer(force.data()));
+    CHECK(position[0] == 5.0f && position[1] == 6.0f && force[2] == 0.0);
+    states.clear();
+    try {
+        world.set_link_states(links, states);
+        CHECK(false);
+    } catch (const isocoat::error &error) {
+        CHECK(error.status() == ISOCOAT_ERROR_INVALID_ARGUMENT);
+    }
+    CHECK(isocoat::inertia_of_sphere(1.0, 0.1)[0] > 0.0 && isocoat::inertia_of_box(1.0, {1, 1, 1})[4] > 0.0);
+    CHECK(isocoat::inertia_of_capsule(1.0, 0.1, 0.2)[8] > 0.0);
+}
+
+static void queries()
+{
+    const isocoat::world world = falling_world();
+    const std::vector<isocoat::body> bodies = world.overlap_sphere({0, 0, 0.1}, 0.05);
+    CHECK(bodies.size() == 2);
+    CHECK(world.collide(bodies[0], bodies[1]).size() == 1);
+    const std::optional<isocoat::ray_hit> hit = world.cast_ray({0, 0, 5}, {0, 0, -1}, 10.0);
+    CHECK(hit && std::fabs(hit->position[2] - 0.295) < 1e-9);
+    CHECK(!world.cast_ray({0, 0, 5}, {0, 0, 1}, 10.0));
+    CHECK(std::fabs(bodies[0].closest_point({0, 0, -1})->distance - 0.9) < 1e-9);
+    CHECK(std::fabs(bodies[0].field({0.1, 0, 0}) - 1.0) < 1e-12);
+    const std::vector<isocoat::vec3> points{{0.1, 0, 0}, {0, 0.05, 0}};
+    std::vector<double> values(2);
+    std::vector<isocoat::vec3> gradients(2);
+    bodies[0].evaluate_field(points, values, gradients);
+    bodies[0].evaluate_field(points, values);
+    CHECK(std::fabs(values[1] - 1.5) < 1e-12 && std::fabs(gradients[1][1] + 10.0) < 1e-9);
+    const isocoat::seed_list seeds = bodies[0].links()[0].skeletons()[0].seeds();
+    CHECK(seeds.positions.size() >= 64 && seeds.normals.size() == seeds.positions.size() && seeds.valid[0] == 1);
+
+    int drawn = 0;
+    world.debug_draw(
+        ISOCOAT_DRAW_SKELETONS | ISOCOAT_DRAW_BOUNDS, [&](const double *, const double *, std::uint32_t) { ++drawn; },
+        [&](const double *, double, std::uint32_t) { ++drawn; });
+    CHECK(drawn >= 26);
+    try {
+        world.debug_draw(ISOCOAT_DRAW_SEEDS, {}, [](const double *, double, std::uint32_t) { throw 42; });
+        CHECK(false);
+    } catch (int thrown) {
+        CHECK(thrown == 42);
+    }
+}
+
+int main()
+{
+    isocoat::check_abi();
+    nouns();
+    worlds_move();
+    steps_and_views();
+    what_a_callback_throws_comes_out_of_the_step();
+    motion();
+    queries();
+    if (failures == 0) std::puts("wrapper: all checks hold");
+    return failures == 0 ? 0 : 1;
+}
