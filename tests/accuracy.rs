@@ -93,7 +93,7 @@ fn round_pairs_meet_the_tolerance_asked_for() {
         for tolerance in [5e-2, 5e-3, 5e-4, 5e-5] {
             let (worst, sideways, bounded, evaluations) = sweep(scheme, tolerance);
             println!("{scheme:?} {tolerance:.0e}: {worst:.1e} {sideways:.1e} {:.1}% {evaluations:.0}", 100.0 * bounded);
-            if worst > tolerance || bounded < 0.95 || sideways > 1e-4f64.max(0.0) && scheme != Scheme::Adaptive {
+            if worst > tolerance || bounded < 0.95 || sideways > 1e-4 {
                 failures.push(format!("{scheme:?} {tolerance}"));
             }
         }
@@ -116,8 +116,6 @@ fn scenes() -> Vec<Scene> {
     );
     let dumbbell = Coat::new(&[Shape::Point(Vec3::new(-0.12, 0.0, 0.0)), Shape::Point(Vec3::new(0.12, 0.0, 0.0))], 0.1);
     let cuboid = Coat::cuboid(Vec3::new(0.2, 0.15, 0.1), 0.05);
-    let tilt = |random: &mut Random, most: f64| Vec3::new(random.range(-most, most), random.range(-most, most), 0.0);
-    let _ = tilt;
     vec![
         Scene {
             name: "segment-segment",
@@ -134,7 +132,10 @@ fn scenes() -> Vec<Scene> {
             a: triangle,
             b: Coat::ball(0.1),
             place: |random| {
-                let at = Vec3::new(random.range(-0.3, 0.3), random.range(-0.2, 0.3), 0.182);
+                // Over the face, past an edge, past a corner.
+                let u = [random.unit(), random.unit(), random.unit()];
+                let (x, y) = (u[0] / (u[0] + u[1] + u[2]), u[1] / (u[0] + u[1] + u[2]));
+                let at = Vec3::new(-0.36 + 0.72 * x + 0.36 * y, -0.24 + 0.72 * y, 0.182);
                 (Pose::default(), Pose { position: at, ..Pose::default() })
             },
         },
@@ -182,6 +183,7 @@ fn other_pairs_agree_with_brute_force() {
             let oracle = Oracle::new(a, b);
             let exact = oracle.force(100);
             let finer = oracle.force(140);
+            assert!(finer.norm() > 0.0, "{}: no contact", scene.name);
             let doubt = (exact - finer).norm() / finer.norm();
             for scheme in [Scheme::Auto, Scheme::Polar, Scheme::Adaptive, Scheme::Seeds] {
                 for tolerance in [5e-2, 5e-3] {

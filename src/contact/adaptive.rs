@@ -83,7 +83,7 @@ pub fn integrate(
     solver.aim(at.sum, tolerance);
     // Solved out, so that a symmetric contact comes out symmetric: no guess from a neighbour shows.
     solver.accept *= 1e-2;
-    if !solver.fit(at, extent) {
+    if solver.fit(at, extent).is_none() {
         // No clear border along an axis: the prediction will do, the cells spread by themselves.
         let scale = solver.frame.scale.map(|s| s.min(extent));
         solver.frame = Frame::new(at, scale);
@@ -188,8 +188,9 @@ impl Work<'_, '_> {
         if count == 0 {
             return;
         }
-        // A fourth-order rule is fifteen times better after a split where the fields are smooth. Count on four.
-        let error = 0.25 * (parent.force - force).norm() / count as f64;
+        // A fourth-order rule is fifteen times better after a split where the fields are smooth, and hardly better
+        // where a kink of theirs crosses the cell. Count on the kink.
+        let error = 0.75 * (parent.force - force).norm() / count as f64;
         for cell in &mut self.workspace.cells[first..] {
             cell.error = error;
         }

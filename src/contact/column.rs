@@ -73,6 +73,15 @@ pub struct Solver<'a> {
     pub evaluations: u32,
 }
 
+/// How a frame came to its size.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fit {
+    /// From the pressure's curvature: the patch is smooth and nearly elliptic.
+    Predicted,
+    /// From the border: it has corners, or flat parts.
+    Measured,
+}
+
 /// What the border looks like from a frame.
 enum Look {
     /// Near enough to the unit circle.
@@ -164,18 +173,16 @@ impl Solver<'_> {
     }
 
     /// Scales the frame so that the border is near the unit circle: first as the pressure's curvature predicts, then, if
-    /// that is off, by the border itself. A tilted face is deepest at its rounded edge, which tells nothing of its size.
-    pub fn fit(&mut self, at: &Deepest, extent: f64) -> bool {
+    /// that is off, by the border itself; `None` where there is no border. A tilted face is deepest at its rounded edge, which tells nothing of its size.
+    pub fn fit(&mut self, at: &Deepest, extent: f64) -> Option<Fit> {
         let predicted = at.curvature.map(|c| if c < 0.0 { (2.0 * at.sum / -c).sqrt().min(extent) } else { extent });
         self.frame.scale = predicted;
-        for _ in 0..4 {
-            match self.look_round(at.sum) {
-                Some(Look::Round) => return true,
-                Some(Look::Refitted) => {}
-                None => return false,
+        for round in 0..4 {
+            if let Look::Round = self.look_round(at.sum)? {
+                return Some(if round == 0 { Fit::Predicted } else { Fit::Measured });
             }
         }
-        true
+        Some(Fit::Measured)
     }
 
     /// Finds the border at eight azimuths; where it is far from the unit circle, moves the frame to the middle of what
@@ -221,50 +228,51 @@ impl Solver<'_> {
     pub fn border(&mut self, (dx, dy): (f64, f64), peak: f64, guess: f64) -> Option<(f64, f64)> {
         let frame = self.frame;
         let along = frame.u * (dx * frame.scale[0]) + frame.v * (dy * frame.scale[1]);
-        let (mut inside, mut outside) = (0.0, f64::INFINITY);
-        let (mut s, mut z) = (1.0, guess);
-        for _ in 0..40 {
+        let (mut inside, mut height_inside, mut outside) = (0.0, 0.0, f64::INFINITY);
+        let (mut s, mut z, mut climbs) = (1.0, guess, 0);
+        for _ in 0..80 {
             let sample = self.pair.sample(&(frame.origin + along * s + frame.normal * z));
             self.evaluations += 1;
             let (phi_s, phi_z) =
                 (sample.difference_gradient.dot(&along), sample.difference_gradient.dot(&frame.normal));
+            let on_slope = phi_z < -STEEPEST * sample.difference_gradient.norm();
+            if !on_slope || sample.difference.abs() >= 0.1 * peak {
+                // Too far off the surface to tell. Climb back to it; where there is none, this is outside.
+                climbs += 1;
+                if on_slope && climbs <= 4 {
+                    z -= sample.difference / phi_z;
+                } else {
+                    outside = outside.min(s);
+                    (s, z, climbs) = (0.5 * (inside + outside), height_inside, 0);
+                }
+                continue;
+            }
+            climbs = 0;
             let (sum_s, sum_z) = (sample.sum_gradient.dot(&along), sample.sum_gradient.dot(&frame.normal));
-            let determinant = phi_z * sum_s - phi_s * sum_z;
-            let settled = sample.difference.abs() < 0.1 * peak;
-            // Along the surface, σ changes by `determinant / phi_z` a unit of s.
-            let rate = if phi_z < 0.0 { determinant / phi_z } else { 0.0 };
-            let on_surface = sample.sum - sample.difference * sum_z / if phi_z < 0.0 { phi_z } else { -1.0 };
+            // σ on the surface here, and its change a unit of s.
+            let sum = sample.sum - sample.difference * sum_z / phi_z;
+            let rate = sum_s - sum_z * phi_s / phi_z;
             // The sign of an extrapolated value counts when the extrapolation was small beside it.
-            let clear = sample.difference.abs() < 0.2 * on_surface.abs();
-            if clear && phi_z < 0.0 {
-                if on_surface > 0.0 {
-                    inside = s;
+            if sample.difference.abs() < 0.2 * sum.abs() {
+                if sum > 0.0 {
+                    (inside, height_inside) = (s, z - sample.difference / phi_z);
                 } else {
                     outside = outside.min(s);
                 }
-            } else if phi_z >= 0.0 {
-                // No surface over this point.
-                outside = outside.min(s);
             }
-            let mut next = if rate < 0.0 { s - on_surface / rate } else { f64::INFINITY };
+            let mut next = if rate < 0.0 { s - sum / rate } else { f64::INFINITY };
             let upper = if outside.is_finite() { outside } else { 2.0 * s.max(0.05) };
             if !(next > inside && next < upper) {
                 next = if outside.is_finite() { 0.5 * (inside + outside) } else { upper };
             }
             let step = next - s;
-            if phi_z < 0.0 {
-                z -= (sample.difference + phi_s * step) / phi_z;
-            } else {
-                z *= next / s;
-            }
+            z -= (sample.difference + phi_s * step) / phi_z;
             s = next;
-            if settled && rate < 0.0 && step.abs() <= self.border_step * s && on_surface.abs() < 0.3 * peak {
+            let near = rate < 0.0 && step.abs() <= self.border_step * s && sum.abs() < 0.3 * peak;
+            if near || outside - inside <= 1e-9 * s {
                 return Some((s, z));
             }
-            if outside - inside <= 1e-9 * s {
-                return (rate < 0.0).then_some((s, z));
-            }
-            if s > 1e3 {
+            if s > 1e4 {
                 return None;
             }
         }

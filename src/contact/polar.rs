@@ -5,7 +5,7 @@
 //! a smooth border, and along each the radii are the Gauss rule for the weight `s` that knows the pressure to be zero
 //! at the border. The frame comes from the contact alone, so turning a body in place changes nothing.
 
-use super::column::{Frame, Solver};
+use super::column::{Fit, Frame, Solver};
 use super::deepest::Deepest;
 use super::pair::Pair;
 use super::patch::Node;
@@ -132,7 +132,7 @@ const RULES: [Rule; 6] = [
 ];
 
 /// Azimuths and radial rule, from the cheapest up.
-const LEVELS: [(usize, usize); 8] = [(6, 0), (8, 0), (12, 1), (16, 2), (24, 3), (32, 3), (48, 4), (64, 5)];
+const LEVELS: [(usize, usize); 9] = [(6, 0), (8, 0), (12, 1), (16, 2), (24, 3), (32, 3), (48, 4), (64, 5), (128, 5)];
 
 /// Part of the tolerance that the roots may use up.
 const SOLVING: f64 = 0.2;
@@ -172,9 +172,9 @@ pub fn integrate(
         nodes.truncate(first);
         Err(NotStarShaped { evaluations })
     };
-    if !solver.fit(at, extent) {
-        return fail(solver.evaluations, nodes);
-    }
+    let Some(fit) = solver.fit(at, extent) else { return fail(solver.evaluations, nodes) };
+    // The differences are those of coarser rules. A smooth patch is at least four times better; corners are not.
+    let trust = if fit == Fit::Predicted { 0.25 } else { 1.0 };
     let start = match tolerance {
         t if t >= 2e-2 => 0,
         t if t >= 2e-3 => 1,
@@ -189,7 +189,7 @@ pub fn integrate(
             return fail(solver.evaluations, nodes);
         };
         // The roots are solved to a part of the tolerance.
-        let error = error + SOLVING * tolerance;
+        let error = trust * error + SOLVING * tolerance;
         let last = index + 1 == LEVELS.len();
         if error <= tolerance || last && last_resort {
             return Ok(Integrated { error, evaluations: solver.evaluations, frame: solver.frame, border });
@@ -202,7 +202,7 @@ pub fn integrate(
     fail(solver.evaluations, nodes)
 }
 
-/// Integrates with one rule. Gives the estimated relative error, or `None` when the patch is not star-shaped.
+/// Integrates with one rule. Gives how far, relatively, half the azimuths and the coarser radii are off, or `None` when the patch is not star-shaped.
 fn sweep(
     solver: &mut Solver,
     peak: f64,
@@ -252,9 +252,8 @@ fn sweep(
     if size <= 0.0 {
         return Some(0.0);
     }
-    // Half the azimuths: at least four times the error of all, and far more where the border is smooth.
     let angular = (half[0] - half[1]).norm() / size;
     let radial = (coarse - force).norm() / size;
     let rounding = 1e-14;
-    Some(0.25 * angular + 0.25 * radial + rounding)
+    Some(angular + radial + rounding)
 }
