@@ -1,0 +1,877 @@
+// isocoat for Bullet: coats on btRigidBody objects. Header-only, C++17, float and double builds of Bullet.
+//
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//
+// A coupler is an action of the dynamics world. At the end of every internal tick it gives isocoat the poses and
+// velocities of the attached bodies, steps the isocoat world by the tick, and puts the contact impulses on the bodies,
+// so that they act in the next tick:
+//
+//     isocoat_world *coats = ...;                                        // gravity may stay 0, see below
+//     isocoat::bullet::coupler coupler(coats, &dynamics);
+//     isocoat_link_desc link_desc = isocoat::bullet::link_desc_from(*body);
+//     ... isocoat_link_create(coats, coat_body, &link_desc, &link); isocoat_skeleton_create(coats, link, ...);
+//     coupler.attach(body, link);
+//     dynamics.addAction(&coupler);                                      // and removeAction before it goes
+//     dynamics.stepSimulation(frame, max_sub_steps, tick);               // as always
+//
+// What to know:
+//
+// Frames     A body's frame in Bullet has its centre of mass at the origin. The link of an attached body has the same
+//            frame, and skeletons are given in it.
+// Forces     Gravity is Bullet's: an attached link gets none from its isocoat world. Forces and impulses of the host,
+//            damping, joints and Bullet's own contacts all act. The coupler expects of the coming tick the forces that
+//            it sees on the body; what then differs counts as a push and is taken up one tick later, none is lost.
+// Velocity   Between ticks a body's velocity holds the impulse that is going to meet the next tick's gravity: a body
+//            that rests on coats shows g dt upwards (0.16 m/s at 60 Hz). So sleeping thresholds must be above that;
+//            Bullet's own, 0.8 m/s, is.
+// Sub-steps  Each internal tick has its own isocoat step. Use fixed ticks: a tick length that changes costs accuracy
+//            while bodies touch.
+// Core       A coat does not replace the body's shape. Filter the shapes against those of coat partners
+//            (add_coated_body or ignore_core), let them collide with the plain world, and see enable_ccd.
+// Sleep      Bodies that touch through their coats fall asleep together. A sleeping body keeps its coat: it is pressed
+//            and presses back, but stays where it is. It wakes when what the coat asks of it changes: a new push, or
+//            support that goes away. A pile at rest stays asleep.
+// Static     A static body's link is fixed, and follows when the host moves the body. A kinematic body's link moves
+//            with the velocity that Bullet works out from its motion state.
+// Absent     A body that is not in the dynamics world has its link disabled until it is back. The coupler touches
+//            bodies only while they are in the dynamics world, so bodies, links, coupler and worlds may be deleted in
+//            any order, if deleted bodies have left the dynamics world and the coupler is no action when it, or the
+//            isocoat world, is deleted.
+// Errors     What sets up throws std::runtime_error. Nothing is thrown through Bullet: see last_error.
+#ifndef ISOCOAT_BULLET_HPP
+#define ISOCOAT_BULLET_HPP
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <exception>
+#include <functional>
+#include <stdexcept>
+#include <string>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include <btBulletDynamicsCommon.h>
+
+#include <isocoat/isocoat.h>
+
+namespace isocoat {
+namespace bullet {
+
+/// Collision group of add_coated_body: the first bit that Bullet's own groups leave free.
+constexpr int coated_group = 64;
+
+namespace detail {
+
+/// Linear and angular part.
+struct motion {
+    btVector3 linear{0, 0, 0};
+    btVector3 angular{0, 0, 0};
+};
+
+inline std::string last_error() {
+    std::string text(isocoat_last_error(nullptr, 0) + 1, '\0');
+    text.resize(std::min(isocoat_last_error(text.data(), text.size()), text.size() - 1));
+    return text;
+}
+
+inline void check(isocoat_status status, const char *what) {
+    if (status != ISOCOAT_OK) {
+        throw std::runtime_error(std::string("isocoat: ") + what + ": " + last_error());
+    }
+}
+
+inline void copy(const btVector3 &from, double (&to)[3]) {
+    to[0] = double(from.x());
+    to[1] = double(from.y());
+    to[2] = double(from.z());
+}
+
+inline btVector3 vector_from(const double *from) {
+    return btVector3(btScalar(from[0]), btScalar(from[1]), btScalar(from[2]));
+}
+
+inline isocoat_pose pose_from(const btTransform &transform) {
+    isocoat_pose pose;
+    copy(transform.getOrigin(), pose.position);
+    const btQuaternion rotation = transform.getRotation();
+    const double q[4] = {double(rotation.x()), double(rotation.y()), double(rotation.z()), double(rotation.w())};
+    const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    for (int i = 0; i < 4; ++i) {
+        pose.orientation[i] = q[i] / norm;
+    }
+    return pose;
+}
+
+inline bool is_finite(const isocoat_link_state &state) {
+    double sum = 0.0;
+    for (int i = 0; i < 3; ++i) {
+        sum += state.pose.position[i] + state.linear_velocity[i] + state.angular_velocity[i];
+    }
+    for (const double x : state.pose.orientation) {
+        sum += x;
+    }
+    return std::isfinite(sum);
+}
+
+/// How a body answers impulses: changes of it need a new link descriptor.
+struct response {
+    bool fixed = true;
+    bool kinematic = false;
+    btScalar inverse_mass = 0;
+    btVector3 inverse_inertia{0, 0, 0};
+    btVector3 linear_factor{1, 1, 1};
+    btVector3 angular_factor{1, 1, 1};
+    bool gyroscopic = false;
+    bool jointed = false;
+
+    static response of(const btRigidBody &body) {
+        constexpr int gyroscopic_flags = BT_ENABLE_GYROSCOPIC_FORCE_EXPLICIT |
+                                         BT_ENABLE_GYROSCOPIC_FORCE_IMPLICIT_WORLD |
+                                         BT_ENABLE_GYROSCOPIC_FORCE_IMPLICIT_BODY;
+        response out;
+        out.kinematic = body.isKinematicObject();
+        out.fixed = !out.kinematic && (body.isStaticObject() || body.getInvMass() == 0);
+        out.inverse_mass = body.getInvMass();
+        out.inverse_inertia = body.getInvInertiaDiagLocal();
+        out.linear_factor = body.getLinearFactor();
+        out.angular_factor = body.getAngularFactor();
+        out.gyroscopic = (body.getFlags() & gyroscopic_flags) != 0;
+        out.jointed = body.getNumConstraintRefs() > 0;
+        return out;
+    }
+
+    bool operator==(const response &other) const {
+        return fixed == other.fixed && kinematic == other.kinematic && inverse_mass == other.inverse_mass &&
+               inverse_inertia == other.inverse_inertia && linear_factor == other.linear_factor &&
+               angular_factor == other.angular_factor && gyroscopic == other.gyroscopic && jointed == other.jointed;
+    }
+
+    bool is_dynamic() const { return !fixed && !kinematic; }
+
+    /// It moves and turns freely, as a solid of its mass and inertia does.
+    bool is_free() const {
+        const btVector3 &inverse = inverse_inertia;
+        if (linear_factor != btVector3(1, 1, 1) || angular_factor != btVector3(1, 1, 1) ||
+            !(inverse.x() > 0 && inverse.y() > 0 && inverse.z() > 0)) {
+            return false;
+        }
+        double moments[3] = {1.0 / double(inverse.x()), 1.0 / double(inverse.y()), 1.0 / double(inverse.z())};
+        std::sort(moments, moments + 3);
+        return moments[2] <= (moments[0] + moments[1]) * (1.0 + 5e-7);
+    }
+
+    /// From torque to angular acceleration, in the world. Made symmetric where angular factors are not 0 or 1.
+    std::array<double, 9> inverse_inertia_at(const btMatrix3x3 &rotation) const {
+        std::array<double, 9> out{};
+        for (int i = 0; i < 3; ++i) {
+            for (int j = 0; j < 3; ++j) {
+                double sum = 0.0;
+                for (int axis = 0; axis < 3; ++axis) {
+                    sum += double(rotation[i][axis]) * double(inverse_inertia[axis]) * double(rotation[j][axis]);
+                }
+                out[std::size_t(3 * i + j)] =
+                    sum * std::sqrt(std::max(0.0, double(angular_factor[i]) * double(angular_factor[j])));
+            }
+        }
+        return out;
+    }
+
+    void describe(const btMatrix3x3 &rotation, isocoat_link_desc &desc) const {
+        desc.kind = fixed ? ISOCOAT_LINK_FIXED : ISOCOAT_LINK_HOST;
+        desc.mass = is_dynamic() ? 1.0 / double(inverse_mass) : 0.0;
+        std::fill(desc.local_center_of_mass, desc.local_center_of_mass + 3, 0.0);
+        std::fill(desc.inertia, desc.inertia + 9, 0.0);
+        desc.gravity_scale = 0.0;
+        desc.velocity_convention = ISOCOAT_VELOCITY_LEAPFROG;
+        desc.flags = (gyroscopic ? ISOCOAT_LINK_HOST_GYROSCOPIC : 0) | (jointed ? ISOCOAT_LINK_CONSTRAINED : 0);
+        if (!is_dynamic()) {
+            return;
+        }
+        if (is_free()) {
+            for (int axis = 0; axis < 3; ++axis) {
+                desc.inertia[4 * axis] = 1.0 / double(inverse_inertia[axis]);
+            }
+            return;
+        }
+        // Held in some direction: the matrix says it; a millionth of freedom keeps it positive definite.
+        desc.inertia[0] = desc.inertia[4] = desc.inertia[8] = desc.mass;
+        desc.flags |= ISOCOAT_LINK_HAS_INVERSE_EFFECTIVE_INERTIA;
+        double(&matrix)[36] = desc.inverse_effective_inertia;
+        std::fill(matrix, matrix + 36, 0.0);
+        const std::array<double, 9> turning = inverse_inertia_at(rotation);
+        const double little = 1e-6 * (turning[0] + turning[4] + turning[8] + 1e-3 / desc.mass);
+        for (int i = 0; i < 3; ++i) {
+            matrix[7 * i] = std::max(double(linear_factor[i]), 1e-6) / desc.mass;
+            for (int j = 0; j < 3; ++j) {
+                matrix[6 * (3 + i) + 3 + j] = turning[std::size_t(3 * i + j)] + (i == j ? little : 0.0);
+            }
+        }
+    }
+
+    /// Change of velocity of a body at this rotation by an impulse.
+    motion answer(const btMatrix3x3 &rotation, const motion &impulse) const {
+        const std::array<double, 9> turning = inverse_inertia_at(rotation);
+        motion out;
+        out.linear = impulse.linear * linear_factor * inverse_mass;
+        for (int i = 0; i < 3; ++i) {
+            double sum = 0.0;
+            for (int j = 0; j < 3; ++j) {
+                sum += turning[std::size_t(3 * i + j)] * double(impulse.angular[j]);
+            }
+            out.angular[i] = btScalar(sum);
+        }
+        return out;
+    }
+};
+
+/// The name in a linker's message when the code was compiled for the other precision (BT_USE_DOUBLE_PRECISION) than
+/// the Bullet library that it is linked with: the function exists in both, with other argument types.
+struct bullet_library_must_have_the_precision_of_the_compiled_code {
+    using function = void (btRigidBody::*)(btScalar, btScalar);
+    static function reference() {
+        static volatile function symbol = &btRigidBody::setDamping;
+        return symbol;
+    }
+};
+
+}  // namespace detail
+
+/// A link descriptor for a body: kind, pose, velocities, mass and inertia. attach() sets the same on any link.
+inline isocoat_link_desc link_desc_from(const btRigidBody &body) {
+    isocoat_link_desc desc = isocoat_link_desc_default();
+    desc.pose = detail::pose_from(body.getWorldTransform());
+    detail::copy(body.getLinearVelocity(), desc.linear_velocity);
+    detail::copy(body.getAngularVelocity(), desc.angular_velocity);
+    detail::response::of(body).describe(body.getWorldTransform().getBasis(), desc);
+    return desc;
+}
+
+/// Skeletons whose coats have the surface of a shape; thickness and points are set, the rest is default.
+///
+/// - shape: sphere (a point), capsule (a segment), box (a box smaller by the coat: edges become round), static plane,
+///   and compounds of these. Bullet's margins are part of these shapes' sizes: the coat's surface is where Bullet shows
+///   the shape, and for spheres and capsules the coat is as thick as the radius.
+/// - coat: thickness on boxes and planes, in m, less than the smallest half extent.
+/// - frame: pose of the shape in the body's frame.
+///
+/// Throws std::runtime_error for other shapes, and for boxes that are too small.
+inline std::vector<isocoat_skeleton_desc> skeletons_from(const btCollisionShape &shape, double coat,
+                                                         const btTransform &frame = btTransform::getIdentity()) {
+    isocoat_skeleton_desc desc = isocoat_skeleton_desc_default();
+    switch (shape.getShapeType()) {
+    case SPHERE_SHAPE_PROXYTYPE:
+        desc.shape = ISOCOAT_SHAPE_POINT;
+        detail::copy(frame.getOrigin(), desc.points[0]);
+        desc.thickness = double(static_cast<const btSphereShape &>(shape).getRadius());
+        return {desc};
+    case CAPSULE_SHAPE_PROXYTYPE: {
+        const auto &capsule = static_cast<const btCapsuleShape &>(shape);
+        btVector3 half(0, 0, 0);
+        half[capsule.getUpAxis()] = capsule.getHalfHeight();
+        desc.shape = ISOCOAT_SHAPE_SEGMENT;
+        detail::copy(frame * half, desc.points[0]);
+        detail::copy(frame * -half, desc.points[1]);
+        desc.thickness = double(capsule.getRadius());
+        return {desc};
+    }
+    case BOX_SHAPE_PROXYTYPE: {
+        const btVector3 half = static_cast<const btBoxShape &>(shape).getHalfExtentsWithMargin();
+        const btQuaternion rotation = frame.getRotation();
+        desc.shape = ISOCOAT_SHAPE_BOX;
+        detail::copy(frame.getOrigin(), desc.points[0]);
+        for (int axis = 0; axis < 3; ++axis) {
+            desc.points[1][axis] = double(half[axis]) - coat;
+            if (desc.points[1][axis] <= 0.0) {
+                throw std::runtime_error("isocoat: the coat is thicker than the box's smallest half extent");
+            }
+        }
+        detail::copy(rotation.getAxis() * rotation.getAngle(), desc.points[2]);
+        desc.thickness = coat;
+        return {desc};
+    }
+    case STATIC_PLANE_PROXYTYPE: {
+        const auto &plane = static_cast<const btStaticPlaneShape &>(shape);
+        const btVector3 normal = plane.getPlaneNormal().normalized();
+        desc.shape = ISOCOAT_SHAPE_PLANE;
+        detail::copy(frame * (normal * (plane.getPlaneConstant() - btScalar(coat))), desc.points[0]);
+        detail::copy(frame.getBasis() * normal, desc.points[1]);
+        desc.thickness = coat;
+        return {desc};
+    }
+    case COMPOUND_SHAPE_PROXYTYPE: {
+        const auto &compound = static_cast<const btCompoundShape &>(shape);
+        std::vector<isocoat_skeleton_desc> all;
+        for (int i = 0; i < compound.getNumChildShapes(); ++i) {
+            const std::vector<isocoat_skeleton_desc> part =
+                skeletons_from(*compound.getChildShape(i), coat, frame * compound.getChildTransform(i));
+            all.insert(all.end(), part.begin(), part.end());
+        }
+        return all;
+    }
+    default:
+        throw std::runtime_error(std::string("isocoat: no skeletons for a shape of type ") + shape.getName());
+    }
+}
+
+/// Adds a body to the dynamics world in a collision group of its own, whose members do not collide with each other by
+/// their shapes; with everything else they do. For worlds in which all coats touch each other.
+inline void add_coated_body(btDiscreteDynamicsWorld &dynamics, btRigidBody *body) {
+    const bool plain_static = body->isStaticOrKinematicObject();
+    const int no_need = plain_static ? int(btBroadphaseProxy::StaticFilter) : 0;
+    dynamics.addRigidBody(body, coated_group, int(btBroadphaseProxy::AllFilter) & ~(coated_group | no_need));
+}
+
+/// Lets the shapes of two bodies pass through each other, or collide again: for pairs whose coats touch. Bullet keeps a
+/// list of such bodies in each body: for many pairs, add_coated_body is faster. To be called while the two are apart.
+inline void ignore_core(btRigidBody &a, btRigidBody &b, bool ignore = true) {
+    a.setIgnoreCollisionCheck(&b, ignore);
+    b.setIgnoreCollisionCheck(&a, ignore);
+}
+
+/// Switches on Bullet's continuous collision detection of a body's shape against the plain world. Coats need none: isocoat
+/// sub-steps fast contacts itself.
+///
+/// - radius: of a sphere inside the shape, in m; the body is swept when it moves by more than that in a tick.
+inline void enable_ccd(btRigidBody &body, btScalar radius) {
+    body.setCcdMotionThreshold(radius);
+    body.setCcdSweptSphereRadius(radius);
+}
+
+/// Couples the bodies of one dynamics world to the links of one isocoat world; see the top of this file.
+class coupler : public btActionInterface {
+public:
+    /// Neither world is owned. Not yet an action: call dynamics->addAction(this), or step() from a tick callback.
+    ///
+    /// Throws std::runtime_error when a world is missing, or the isocoat library does not fit its header.
+    coupler(isocoat_world *world, btDiscreteDynamicsWorld *dynamics) : world_(world), dynamics_(dynamics) {
+        if (detail::bullet_library_must_have_the_precision_of_the_compiled_code::reference() == nullptr ||
+            world == nullptr || dynamics == nullptr) {
+            throw std::runtime_error("isocoat: a coupler needs an isocoat world and a dynamics world");
+        }
+        detail::check(isocoat_check_abi(), "library and header differ");
+    }
+
+    coupler(const coupler &) = delete;
+    coupler &operator=(const coupler &) = delete;
+
+    /// Ties a link to a body: the link gets the body's kind, mass, inertia and pose, and follows it from now on.
+    ///
+    /// - body: not NULL, not attached yet; it need not be in the dynamics world yet.
+    /// - link: with its skeletons, or without; not attached yet.
+    void attach(btRigidBody *body, isocoat_link link) {
+        if (body == nullptr || is_attached(body)) {
+            throw std::runtime_error(body ? "isocoat: the body is attached already" : "isocoat: the body is NULL");
+        }
+        for (const attachment &other : entries_) {
+            if (same(other.link, link)) {
+                throw std::runtime_error("isocoat: the link is attached to another body");
+            }
+        }
+        attachment fresh;
+        fresh.body = body;
+        fresh.link = link;
+        describe(fresh);
+        entries_.push_back(fresh);
+        index();
+    }
+
+    /// Unties a body; false when it was not attached. The link stays as it is: destroy or disable it, or attach it
+    /// elsewhere. The body may be gone already.
+    bool detach(const btRigidBody *body) {
+        const auto found = of_body_.find(body);
+        if (found == of_body_.end()) {
+            return false;
+        }
+        entries_.erase(entries_.begin() + std::ptrdiff_t(found->second));
+        index();
+        return true;
+    }
+
+    bool is_attached(const btRigidBody *body) const { return of_body_.count(body) != 0; }
+
+    /// The link of a body. Throws std::runtime_error when it is not attached.
+    isocoat_link link_of(const btRigidBody *body) const { return entries_[find(body)].link; }
+
+    /// Takes over a new mass, inertia, factor, flag or kind at once. Every tick looks for such changes as well.
+    void refresh(const btRigidBody *body) { describe(entries_[find(body)]); }
+
+    /// Forgets the contact history of a body that the host puts elsewhere. Jumps of more than half its thinnest coat,
+    /// or half a radian, are found without it.
+    void teleport(const btRigidBody *body) { entries_[find(body)].jumped = true; }
+
+    /// One tick, at its end. Bullet calls it when the coupler is an action.
+    void updateAction(btCollisionWorld *, btScalar dt) override { step(dt); }
+
+    /// The same for hosts that call it from their own internal tick callback instead.
+    void step(btScalar dt) noexcept {
+        try {
+            tick(dt);
+        } catch (const std::exception &error) {
+            report(error.what());
+        }
+    }
+
+    /// Draws the contacts of the last step: a line along the normal, in proportion to the square root of the area.
+    void debugDraw(btIDebugDraw *drawer) override {
+        const isocoat_contact *contacts = nullptr;
+        std::size_t count = 0;
+        if (drawer == nullptr || isocoat_world_get_contacts(world_, &contacts, &count) != ISOCOAT_OK) {
+            return;
+        }
+        for (std::size_t i = 0; i < count; ++i) {
+            const btVector3 position = detail::vector_from(contacts[i].position);
+            const btVector3 normal = detail::vector_from(contacts[i].normal);
+            const btScalar half = btScalar(0.5 * std::sqrt(contacts[i].area));
+            drawer->drawLine(position - normal * half, position + normal * half, btVector3(1, btScalar(0.6), 0));
+        }
+    }
+
+    /// What went wrong last in a tick; empty if nothing did. A failed step leaves the bodies to Bullet alone.
+    const std::string &last_error() const { return error_; }
+    void clear_error() { error_.clear(); }
+
+    /// Sets who is told about errors in ticks, as they happen. It must not change the coupler.
+    void on_error(std::function<void(const std::string &)> callback) { on_error_ = std::move(callback); }
+
+private:
+    struct attachment {
+        btRigidBody *body = nullptr;
+        isocoat_link link{};
+        detail::response response;
+        /// Rotation at which the link was described.
+        btMatrix3x3 basis = btMatrix3x3::getIdentity();
+        /// In the dynamics world, with a sound state; the link is enabled.
+        bool present = true;
+        /// The contact history is to be forgotten.
+        bool jumped = true;
+        bool asleep = false;
+        /// Ticks that it has slept.
+        unsigned slept = 0;
+        /// Velocities as isocoat was told.
+        detail::motion told;
+        /// Accelerations as isocoat was told.
+        detail::motion expected;
+        /// Sleeping bodies: what gravity and contacts usually add to the velocities in a tick, and what came beyond that.
+        detail::motion usual;
+        detail::motion owed;
+        /// Kinematic bodies: where it glides to, from where, and since when.
+        btTransform pose = btTransform::getIdentity();
+        btTransform start = btTransform::getIdentity();
+        btScalar gliding = 0;
+        /// Coat island: position of another member, and whether one of them cannot sleep yet.
+        std::size_t root = 0;
+        bool busy = false;
+    };
+
+    static bool same(isocoat_link a, isocoat_link b) {
+        return a.index == b.index && a.generation == b.generation && a.world == b.world;
+    }
+
+    std::size_t find(const btRigidBody *body) const {
+        const auto found = of_body_.find(body);
+        if (found == of_body_.end()) {
+            throw std::runtime_error("isocoat: the body is not attached");
+        }
+        return found->second;
+    }
+
+    void index() {
+        of_body_.clear();
+        of_link_.clear();
+        for (std::size_t i = 0; i < entries_.size(); ++i) {
+            of_body_[entries_[i].body] = i;
+            of_link_[entries_[i].link.index] = i;
+        }
+    }
+
+    void report(const std::string &text) noexcept {
+        try {
+            error_ = text;
+            if (on_error_) {
+                on_error_(error_);
+            }
+        } catch (...) {
+            // An exception must not pass through Bullet; the text is kept.
+        }
+    }
+
+    /// Gives the link what the body is.
+    void describe(attachment &entry) {
+        isocoat_link_desc desc = isocoat_link_desc_default();
+        detail::check(isocoat_link_get_desc(world_, entry.link, &desc), "attach");
+        const isocoat_link_desc body = link_desc_from(*entry.body);
+        desc.pose = body.pose;
+        std::copy(body.linear_velocity, body.linear_velocity + 3, desc.linear_velocity);
+        std::copy(body.angular_velocity, body.angular_velocity + 3, desc.angular_velocity);
+        const detail::response response = detail::response::of(*entry.body);
+        response.describe(entry.body->getWorldTransform().getBasis(), desc);
+        detail::check(isocoat_link_set_desc(world_, entry.link, &desc), "attach");
+        entry.response = response;
+        entry.basis = entry.body->getWorldTransform().getBasis();
+        entry.expected.linear = detail::vector_from(desc.external_acceleration);
+        entry.expected.angular = detail::vector_from(desc.external_angular_acceleration);
+    }
+
+    void tick(btScalar dt) {
+        if (!(dt > 0)) {
+            return;
+        }
+        find_present();
+        gather(dt);
+        if (!push_states()) {
+            drop_stale_links();
+            gather(dt);
+            if (!push_states()) {
+                throw std::runtime_error("isocoat: states refused: " + detail::last_error());
+            }
+        }
+        detail::check(isocoat_world_step(world_, double(dt)), "step");
+        apply(dt);
+        settle(dt);
+    }
+
+    /// Which bodies are in the dynamics world. Others may have been deleted and are not looked at.
+    void find_present() {
+        found_.assign(entries_.size(), 0);
+        const btCollisionObjectArray &objects = dynamics_->getCollisionObjectArray();
+        for (int i = 0; i < objects.size(); ++i) {
+            const auto found = of_body_.find(objects[i]);
+            if (found != of_body_.end()) {
+                found_[found->second] = 1;
+            }
+        }
+    }
+
+    /// Collects the states of all links that may have moved.
+    void gather(btScalar dt) {
+        links_.clear();
+        states_.clear();
+        movers_.clear();
+        found_.resize(entries_.size(), 0);
+        for (std::size_t i = 0; i < entries_.size(); ++i) {
+            attachment &entry = entries_[i];
+            isocoat_link_state state{};
+            const bool present = found_[i] != 0 && state_of(entry, dt, state);
+            if (present != entry.present) {
+                if (isocoat_link_set_enabled(world_, entry.link, present) == ISOCOAT_OK) {
+                    entry.present = present;
+                    entry.jumped = true;
+                }
+            }
+            if (!present) {
+                continue;
+            }
+            if (entry.jumped || entry.asleep) {
+                // A link that is gone shows in push_states.
+                (void)(isocoat_link_teleport(world_, entry.link, &state) == ISOCOAT_OK);
+                entry.jumped = false;
+            }
+            links_.push_back(entry.link);
+            states_.push_back(state);
+            movers_.push_back(i);
+        }
+    }
+
+    /// The state of a body's link at the end of this tick, and what the link is told apart from it; false when the body
+    /// has no sound state.
+    bool state_of(attachment &entry, btScalar dt, isocoat_link_state &state) {
+        const btRigidBody &body = *entry.body;
+        const detail::response now = detail::response::of(body);
+        // The matrix of a body that is held in some direction turns with it.
+        const bool turned = now.is_dynamic() && !now.is_free() && !(body.getWorldTransform().getBasis() == entry.basis);
+        if (turned || !(now == entry.response)) {
+            describe_again(entry, now);
+        }
+        btTransform pose = body.getWorldTransform();
+        entry.told = detail::motion{body.getLinearVelocity(), body.getAngularVelocity()};
+        const bool slept = entry.asleep;
+        entry.asleep = now.is_dynamic() && !body.isActive();
+        entry.slept = entry.asleep ? entry.slept + 1 : 0;
+        if (now.fixed) {
+            entry.told = detail::motion();
+        } else if (now.kinematic) {
+            glide(entry, dt, pose);
+        } else {
+            expect(entry, slept);
+            if (entry.asleep) {
+                // At rest in the middle of the tick: isocoat adds half a tick's gravity to a leapfrog velocity.
+                entry.told = detail::motion{entry.expected.linear * (btScalar(-0.5) * dt), btVector3(0, 0, 0)};
+            }
+        }
+        state.pose = detail::pose_from(pose);
+        detail::copy(entry.told.linear, state.linear_velocity);
+        detail::copy(entry.told.angular, state.angular_velocity);
+        if (!detail::is_finite(state)) {
+            report("isocoat: a body's pose or velocity is not finite; its coat is disabled");
+            return false;
+        }
+        return true;
+    }
+
+    void describe_again(attachment &entry, const detail::response &now) {
+        isocoat_link_desc desc = isocoat_link_desc_default();
+        if (isocoat_link_get_desc(world_, entry.link, &desc) != ISOCOAT_OK) {
+            return;
+        }
+        now.describe(entry.body->getWorldTransform().getBasis(), desc);
+        if (isocoat_link_set_desc(world_, entry.link, &desc) == ISOCOAT_OK) {
+            entry.response = now;
+            entry.basis = entry.body->getWorldTransform().getBasis();
+        } else {
+            report("isocoat: a body's new mass or inertia is refused: " + detail::last_error());
+        }
+    }
+
+    /// Tells the link what its body will add by itself in the next tick: what acts on it now. That is exact within a
+    /// frame of several ticks, and for lasting forces; the first and the last tick of a force are taken up afterwards.
+    void expect(attachment &entry, bool slept) {
+        const btRigidBody &body = *entry.body;
+        const bool no_force = body.getTotalForce().isZero();
+        detail::motion expected;
+        if (entry.asleep || (slept && no_force)) {
+            // Gravity is not among the forces of a sleeping body.
+            expected.linear = body.getGravity() * body.getLinearFactor();
+        } else {
+            expected.linear = body.getTotalForce() * body.getInvMass();
+            expected.angular = body.getInvInertiaTensorWorld() * body.getTotalTorque();
+        }
+        if (expected.linear == entry.expected.linear && expected.angular == entry.expected.angular) {
+            return;
+        }
+        double linear[3];
+        double angular[3];
+        detail::copy(expected.linear, linear);
+        detail::copy(expected.angular, angular);
+        if (isocoat_link_set_external_acceleration(world_, entry.link, linear, angular) == ISOCOAT_OK) {
+            entry.expected = expected;
+        }
+    }
+
+    /// Bullet puts a kinematic body at the pose of the frame's end in the frame's first tick, with the velocity that
+    /// takes it there over the frame. Its coat follows tick by tick.
+    static void glide(attachment &entry, btScalar dt, btTransform &pose) {
+        const btRigidBody &body = *entry.body;
+        if (!body.isActive()) {
+            entry.told = detail::motion();
+        }
+        if (entry.jumped) {
+            entry.start = entry.pose = pose;
+            entry.told = detail::motion();
+            return;
+        }
+        if (!(pose == entry.pose)) {
+            entry.start = entry.pose;
+            entry.pose = pose;
+            entry.gliding = 0;
+        }
+        entry.gliding += dt;
+        btVector3 turn, way;
+        btTransformUtil::calculateVelocity(entry.start, pose, btScalar(1), way, turn);
+        const btScalar speed2 = entry.told.linear.length2() + entry.told.angular.length2();
+        const btScalar passed2 = speed2 * entry.gliding * entry.gliding;
+        if (passed2 < btScalar(0.998) * (way.length2() + turn.length2()) && speed2 > 0) {
+            btTransformUtil::integrateTransform(entry.start, entry.told.linear, entry.told.angular, entry.gliding,
+                                                pose);
+        }
+    }
+
+    bool push_states() {
+        const isocoat_status status = isocoat_world_set_link_states(world_, links_.data(), states_.data(), links_.size());
+        if (status != ISOCOAT_OK && status != ISOCOAT_ERROR_INVALID_HANDLE) {
+            throw std::runtime_error("isocoat: states refused: " + detail::last_error());
+        }
+        return status == ISOCOAT_OK;
+    }
+
+    /// Links that were destroyed are detached.
+    void drop_stale_links() {
+        const auto stale = [this](const attachment &entry) {
+            isocoat_link_state state;
+            return isocoat_link_get_state(world_, entry.link, &state) == ISOCOAT_ERROR_INVALID_HANDLE;
+        };
+        entries_.erase(std::remove_if(entries_.begin(), entries_.end(), stale), entries_.end());
+        index();
+        find_present();
+    }
+
+    void apply(btScalar dt) {
+        impulses_.resize(6 * links_.size());
+        const isocoat_buffer linear{impulses_.data(), 6 * sizeof(double), ISOCOAT_FORMAT_F64};
+        const isocoat_buffer angular{impulses_.data() + 3, 6 * sizeof(double), ISOCOAT_FORMAT_F64};
+        if (links_.empty()) {
+            return;
+        }
+        detail::check(isocoat_world_get_link_impulses(world_, links_.data(), links_.size(), linear, angular),
+                      "impulses");
+        for (std::size_t i = 0; i < movers_.size(); ++i) {
+            attachment &entry = entries_[movers_[i]];
+            if (!entry.response.is_dynamic()) {
+                continue;
+            }
+            const double *numbers = impulses_.data() + 6 * i;
+            const detail::motion impulse{detail::vector_from(numbers), detail::vector_from(numbers + 3)};
+            if (!entry.asleep || stirs(entry, dt)) {
+                push(entry, impulse);
+            }
+        }
+    }
+
+    /// Whether a sleeping body is to wake, and if so, wakes it. While nothing around it moves, contacts push a sleeping
+    /// body alike in every tick. What they push beyond that adds up, and fades within some ten ticks if it stays small;
+    /// beyond a hundredth of the body's sleeping threshold the body wakes, with all of it.
+    bool stirs(attachment &entry, btScalar dt) const {
+        btRigidBody &body = *entry.body;
+        isocoat_wrench wrench;
+        if (isocoat_link_get_wrench(world_, entry.link, &wrench) != ISOCOAT_OK) {
+            return false;
+        }
+        const detail::motion push = entry.response.answer(
+            body.getWorldTransform().getBasis(),
+            detail::motion{detail::vector_from(wrench.force) * dt, detail::vector_from(wrench.torque) * dt});
+        const detail::motion urge{push.linear + entry.expected.linear * dt, push.angular + entry.expected.angular * dt};
+        btScalar part = btScalar(0.01);
+        if (entry.slept == 1) {
+            entry.usual = detail::motion();
+            entry.owed = detail::motion();
+            part = 1;
+        }
+        const detail::motion owed{entry.owed.linear + urge.linear - entry.usual.linear,
+                                  entry.owed.angular + urge.angular - entry.usual.angular};
+        if (owed.linear.length() <= part * body.getLinearSleepingThreshold() &&
+            owed.angular.length() <= part * body.getAngularSleepingThreshold()) {
+            if (entry.slept == 1) {
+                entry.usual = urge;
+            } else {
+                entry.owed = detail::motion{owed.linear * btScalar(0.9), owed.angular * btScalar(0.9)};
+            }
+            return false;
+        }
+        body.activate(true);
+        if (!body.isActive()) {
+            return false;  // the host has disabled its simulation
+        }
+        // As if it had been awake when the frame began.
+        if (body.getTotalForce().isZero()) {
+            body.applyGravity();
+        }
+        body.setLinearVelocity(entry.told.linear + entry.owed.linear);
+        body.setAngularVelocity(entry.told.angular + entry.owed.angular);
+        return true;
+    }
+
+    /// Puts an impulse on a body. Bodies without one stay as they are, bit by bit.
+    static void push(const attachment &entry, const detail::motion &impulse) {
+        btRigidBody &body = *entry.body;
+        if (!impulse.linear.isZero()) {
+            body.applyCentralImpulse(impulse.linear);
+        }
+        if (impulse.angular.isZero()) {
+            return;
+        }
+        if (entry.response.is_free()) {
+            body.applyTorqueImpulse(impulse.angular);
+        } else {
+            const detail::motion change = entry.response.answer(body.getWorldTransform().getBasis(), impulse);
+            body.setAngularVelocity(body.getAngularVelocity() + change.angular);
+        }
+    }
+
+    /// Bodies that touch through their coats fall asleep together or not at all: those that could sleep already wait
+    /// for the others.
+    void settle(btScalar dt) {
+        if (gDisableDeactivation || !(gDeactivationTime > 0)) {
+            return;
+        }
+        const isocoat_contact *contacts = nullptr;
+        std::size_t count = 0;
+        detail::check(isocoat_world_get_contacts(world_, &contacts, &count), "contacts");
+        for (std::size_t i = 0; i < entries_.size(); ++i) {
+            entries_[i].root = i;
+            entries_[i].busy = false;
+        }
+        for (std::size_t i = 0; i < count; ++i) {
+            const std::size_t a = position_of(contacts[i].link_a);
+            const std::size_t b = position_of(contacts[i].link_b);
+            if (is_mover(a) && is_mover(b)) {
+                const std::size_t low = std::min(root_of(a), root_of(b));
+                const std::size_t high = std::max(root_of(a), root_of(b));
+                entries_[high].root = low;
+            } else if (is_mover(a)) {
+                entries_[a].busy |= moves(contacts[i].link_b);
+            } else if (is_mover(b)) {
+                entries_[b].busy |= moves(contacts[i].link_a);
+            }
+        }
+        const btScalar ready = gDeactivationTime - btScalar(1.5) * dt;
+        for (const std::size_t i : movers_) {
+            const attachment &entry = entries_[i];
+            const int state = is_mover(i) ? entry.body->getActivationState() : ISLAND_SLEEPING;
+            const bool drowsy = state == ISLAND_SLEEPING || state == WANTS_DEACTIVATION || state == DISABLE_SIMULATION ||
+                                (state == ACTIVE_TAG && entry.body->getDeactivationTime() > ready);
+            if (entry.busy || !drowsy) {
+                entries_[root_of(i)].busy = true;
+            }
+        }
+        for (const std::size_t i : movers_) {
+            const btRigidBody &body = *entries_[i].body;
+            const int state = body.getActivationState();
+            if (!is_mover(i) || !entries_[root_of(i)].busy || (state != ACTIVE_TAG && state != WANTS_DEACTIVATION)) {
+                continue;
+            }
+            body.setActivationState(ACTIVE_TAG);
+            entries_[i].body->setDeactivationTime(
+                std::min(body.getDeactivationTime(), gDeactivationTime - btScalar(2) * dt));
+        }
+    }
+
+    std::size_t position_of(isocoat_link link) const {
+        const auto found = of_link_.find(link.index);
+        return found != of_link_.end() && same(entries_[found->second].link, link) ? found->second : entries_.size();
+    }
+
+    bool is_mover(std::size_t position) const {
+        return position < entries_.size() && entries_[position].present && entries_[position].response.is_dynamic();
+    }
+
+    std::size_t root_of(std::size_t position) const {
+        while (entries_[position].root != position) {
+            position = entries_[position].root;
+        }
+        return position;
+    }
+
+    /// Whether a link that no dynamic body moves is moving.
+    bool moves(isocoat_link link) const {
+        isocoat_link_state state;
+        if (isocoat_link_get_state(world_, link, &state) != ISOCOAT_OK) {
+            return false;
+        }
+        return detail::vector_from(state.linear_velocity).length2() +
+                   detail::vector_from(state.angular_velocity).length2() >
+               btScalar(1e-6);
+    }
+
+    isocoat_world *world_;
+    btDiscreteDynamicsWorld *dynamics_;
+    /// In the order of their attachment.
+    std::vector<attachment> entries_;
+    std::unordered_map<const btCollisionObject *, std::size_t> of_body_;
+    std::unordered_map<std::uint32_t, std::size_t> of_link_;
+    std::vector<char> found_;
+    /// What goes to isocoat and comes back in a tick, and the positions of its entries.
+    std::vector<isocoat_link> links_;
+    std::vector<isocoat_link_state> states_;
+    std::vector<std::size_t> movers_;
+    std::vector<double> impulses_;
+    std::string error_;
+    std::function<void(const std::string &)> on_error_;
+};
+
+}  // namespace bullet
+}  // namespace isocoat
+
+#endif
