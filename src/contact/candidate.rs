@@ -1,11 +1,21 @@
 //! A candidate: two bodies that may touch in this step, and what is remembered of them from the last.
+//!
+//! While two bodies hardly move against each other from one sub-step to the next, their contact surface is not
+//! integrated anew: each node's pressure follows the motion by its stiffness, `p + g n·Δ`. The force is then off by the
+//! square of the motion over the depth, so the motion that is allowed goes with the root of the tolerance. A step always
+//! begins with a fresh surface, so that nothing but the poses decides.
 
 use super::friction::Bristle;
 use super::pair::Pair;
-use super::patch::Sums;
+use super::patch::{Node, Sums};
 use super::press::Material;
-use super::surface::Surface;
+use super::surface::{Settings, Surface, integrate};
+use crate::base::Motion;
 use crate::handle::RawId;
+use crate::math::{Quat, Vec3, rotation_to_vector};
+
+/// Motion of the nodes over the depth of the contact, over the root of the tolerance, up to which the surface is kept.
+const KEEP: f64 = 0.5;
 
 /// Two bodies whose bounds meet.
 #[derive(Debug, Default)]
@@ -20,10 +30,90 @@ pub struct Candidate {
     pub material: Material,
     /// Their contact surface at the last evaluation.
     pub surface: Surface,
+    /// The nodes of the surface, brought up to the present poses.
+    pub nodes: Vec<Node>,
+    /// Where the two links were when the surface was integrated; none when there is more than one a side.
+    reference: Option<[Placement; 2]>,
     /// What each of its patches came to.
     pub loads: Vec<Sums>,
     /// What lasts from step to step.
     pub memory: Memory,
+}
+
+/// A link in the pair's frame.
+#[derive(Clone, Copy, Debug, Default)]
+struct Placement {
+    center: Vec3,
+    rotation: Quat,
+}
+
+impl Placement {
+    /// How far the material point at `p` has moved, and the link turned, from here to `now`.
+    fn moved(&self, now: &Placement, p: &Vec3) -> (Vec3, Vec3) {
+        let turn = now.rotation * self.rotation.inverse();
+        let arm = p - self.center;
+        (now.center + turn * arm - p, rotation_to_vector(&turn))
+    }
+}
+
+impl Candidate {
+    /// Brings the contact surface up to the present poses, by a fresh integration when `fresh` or when the bodies have
+    /// moved too far against each other. Gives the evaluations of the two fields that it took.
+    pub fn look(&mut self, motions: &[Motion], settings: &Settings, fresh: bool) -> u32 {
+        let kept = !fresh && self.follow(motions, settings.tolerance);
+        if kept {
+            return 0;
+        }
+        self.pair.place(motions, self.lead);
+        integrate(&self.pair, settings, &mut self.surface);
+        self.nodes.clone_from(&self.surface.nodes);
+        self.reference = self.placements(motions);
+        self.surface.evaluations
+    }
+
+    /// Where the two links are, when there is one a side.
+    fn placements(&self, motions: &[Motion]) -> Option<[Placement; 2]> {
+        let origin = motions[self.lead as usize].center;
+        let place = |link: u32| {
+            let motion = &motions[link as usize];
+            Placement { center: motion.center - origin, rotation: motion.rotation }
+        };
+        Some([place(self.pair.a.only_link()?), place(self.pair.b.only_link()?)])
+    }
+
+    /// Lets the nodes follow the motion since the surface was integrated. False when it is too much.
+    fn follow(&mut self, motions: &[Motion], tolerance: f64) -> bool {
+        let (Some(then), Some(now)) = (self.reference, self.placements(motions)) else { return false };
+        if self.surface.patches.is_empty() || !self.surface.overloads.is_empty() {
+            return false;
+        }
+        for patch in &self.surface.patches {
+            let depth = patch.peak_pressure / self.pair.scale / patch.slope;
+            let size = (patch.deepest - self.surface.nodes[patch.nodes.0].position).norm();
+            let limit = KEEP * tolerance.sqrt() * depth;
+            for (then, now) in then.iter().zip(&now) {
+                let (moved, turned) = then.moved(now, &patch.deepest);
+                if moved.norm() + turned.norm() * size > limit {
+                    return false;
+                }
+            }
+        }
+        self.pair.origin = motions[self.lead as usize].center;
+        self.nodes.clear();
+        for node in &self.surface.nodes {
+            let moved = |side: usize| then[side].moved(&now[side], &node.position).0;
+            let size = node.force.norm();
+            if size <= 0.0 {
+                self.nodes.push(*node);
+                continue;
+            }
+            let normal = node.force / size;
+            let closing = (moved(0) - moved(1)).dot(&normal);
+            let force = normal * (size + node.stiffness * closing).max(0.0);
+            self.nodes.push(Node { force, ..*node });
+        }
+        true
+    }
 }
 
 /// What lasts from step to step while two bodies are candidates.

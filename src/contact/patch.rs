@@ -27,6 +27,8 @@ pub struct Patch {
     pub normal: Vec3,
     /// Pressure there \[Pa\].
     pub peak_pressure: f64,
+    /// How fast `σ` changes across the surface there: `σ` over it is about half the depth of the overlap \[1/m\].
+    pub slope: f64,
     /// First and last-plus-one of its nodes.
     pub nodes: (usize, usize),
     /// Estimated relative error of the force.

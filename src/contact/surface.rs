@@ -137,6 +137,7 @@ impl Surface {
             deepest: at.position,
             normal: at.normal,
             peak_pressure: scale * at.sum,
+            slope: at.slope,
             nodes: (first, self.nodes.len()),
             error_estimate: error,
             evaluations: evaluations + at.evaluations,
@@ -236,7 +237,7 @@ fn closed_patch(pair: &Pair, approach: &Approach, out: &mut Surface) -> bool {
         axes: [Vec3::zeros(); 2],
         curvature: [0.0; 2],
         sum: axial.peak_pressure / pair.scale,
-        slope: 0.0,
+        slope: [&pair.a, &pair.b].map(|side| side.skeletons[0].profile.stiffness).into_iter().fold(0.0, f64::max),
         skeletons: [0, 0],
         evaluations: 0,
     };

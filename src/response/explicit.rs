@@ -14,5 +14,5 @@ pub fn step(
     settings: &Settings,
     work: &mut Work,
 ) {
-    advance(motions, island, candidates, dt, 0.0, settings, work);
+    advance(motions, island, candidates, dt, 0.0, settings, true, work);
 }

@@ -5,7 +5,7 @@ use crate::contact::candidate::Candidate;
 use crate::contact::friction;
 use crate::contact::pair::Pair;
 use crate::contact::press::{Carriers, Grip, friction_radius, press};
-use crate::contact::surface::{Settings, integrate};
+use crate::contact::surface::Settings;
 use crate::contact::{deepest::Approach, patch};
 use crate::math::{Vec3, Wrench};
 
@@ -32,7 +32,8 @@ pub struct Work {
 }
 
 /// Advances an island by `h`, with the part `before` of the drift before the kick: a half for the symplectic second
-/// order, none for the force at the pose of the beginning.
+/// order, none for the force at the pose of the beginning. With `fresh`, all contact surfaces are integrated anew.
+#[expect(clippy::too_many_arguments, reason = "a sub-step touches the whole state of an island")]
 pub fn advance(
     motions: &mut [Motion],
     island: &Island,
@@ -40,14 +41,13 @@ pub fn advance(
     h: f64,
     before: f64,
     settings: &Settings,
+    fresh: bool,
     work: &mut Work,
 ) {
     drift(motions, island, before * h);
     for index in &island.candidates {
         let candidate = &mut candidates[*index as usize];
-        candidate.pair.place(motions, candidate.lead);
-        integrate(&candidate.pair, settings, &mut candidate.surface);
-        work.evaluations += u64::from(candidate.surface.evaluations);
+        work.evaluations += u64::from(candidate.look(motions, settings, fresh));
         if candidate.material.static_friction > 0.0 {
             bend_bristles(candidate, motions, h, &mut work.carriers);
         }
@@ -77,12 +77,12 @@ fn key(pair: &Pair, patch: &patch::Patch) -> [u32; 2] {
 }
 
 fn bend_bristles(candidate: &mut Candidate, motions: &[Motion], h: f64, carriers: &mut Carriers) {
-    let Candidate { pair, surface, memory, .. } = candidate;
+    let Candidate { pair, surface, nodes, memory, .. } = candidate;
     for bristle in &mut memory.bristles {
         bristle.seen = false;
     }
     for patch in &surface.patches {
-        let sums = patch::sum(&surface.nodes[patch.nodes.0..patch.nodes.1]);
+        let sums = patch::sum(&nodes[patch.nodes.0..patch.nodes.1]);
         let size = sums.force.norm();
         if size > 0.0 {
             let normal = sums.force / size;
@@ -95,10 +95,10 @@ fn bend_bristles(candidate: &mut Candidate, motions: &[Motion], h: f64, carriers
 }
 
 fn press_candidate(candidate: &mut Candidate, index: usize, motions: &mut [Motion], h: f64, work: &mut Work) {
-    let Candidate { pair, surface, material, memory, loads, .. } = candidate;
+    let Candidate { pair, surface, nodes, material, memory, loads, .. } = candidate;
     loads.clear();
     for patch in &surface.patches {
-        let nodes = &surface.nodes[patch.nodes.0..patch.nodes.1];
+        let nodes = &nodes[patch.nodes.0..patch.nodes.1];
         let pressed = press(pair, nodes, material, h, motions, &mut work.carriers, &mut work.forces);
         let Some(sums) = pressed else {
             loads.push(patch::Sums::default());

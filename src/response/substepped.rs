@@ -70,8 +70,8 @@ pub fn step(
     let wanted = (rate2.sqrt() * dt / limits.phase).max(travel / TRAVEL).ceil().max(1.0);
     let substeps = wanted.min(f64::from(limits.most)) as u32;
     let h = dt / f64::from(substeps);
-    for _ in 0..substeps {
-        advance(motions, island, candidates, h, 0.5, settings, work);
+    for index in 0..substeps {
+        advance(motions, island, candidates, h, 0.5, settings, index == 0, work);
     }
     Taken { substeps, wanted }
 }

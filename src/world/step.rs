@@ -410,7 +410,8 @@ impl World {
         let motions: Vec<Motion> = (0..self.links.capacity())
             .map(|index| if self.links.is_live(index) { self.motion_of(&self.links[index]) } else { Motion::default() })
             .collect();
-        let mut candidate = Candidate { bodies: [a.raw.index, b.raw.index], ..Candidate::default() };
+        let mut candidate = Candidate::default();
+        candidate.bodies = [a.raw.index, b.raw.index];
         let bounds = [a, b].map(|body| self.bounds_of(body.index(), &motions, 0.0));
         let mut contacts = Vec::new();
         let [Some(first), Some(second)] = &bounds else { return Ok(contacts) };
