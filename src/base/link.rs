@@ -1,4 +1,4 @@
-//! Kinds of links, and what is kept of a link between steps.
+//! Kinds of links.
 
 /// Who moves a link.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

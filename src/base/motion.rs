@@ -91,7 +91,7 @@ impl Motion {
             self.rotation = advance_rotation(&self.rotation, &self.twist.angular, h);
             return;
         }
-        // Euler's equations by the implicit midpoint rule, in two fixed-point rounds: the angular velocity over the
+        // Euler's equations by the implicit midpoint rule, in three fixed-point rounds: the angular velocity over the
         // drift is the one that the (constant) angular momentum has at the rotation half way.
         let momentum = rotate_tensor(&self.rotation, local) * self.twist.angular;
         let mut middle = self.twist.angular;

@@ -37,7 +37,7 @@ pub struct isocoat_body_desc {
     pub static_friction: f64,
     /// Viscous friction, in sqrt(N s/m^3), at least 0; a pair takes the product. Default 0.
     pub viscous_friction: f64,
-    /// Hunt-Crossley dissipation, in s/m, at least 0; a pair takes the mean weighted by the other's softness.
+    /// Hunt-Crossley dissipation, in s/m, at least 0; a pair takes the mean weighted by the other's stiffness.
     /// Default 0.
     pub dissipation: f64,
     /// What this body is, as bits. Default 1.

@@ -291,9 +291,7 @@ pub unsafe extern "C" fn isocoat_link_set_external_acceleration(
     unsafe {
         write(world, |inner| {
             let (linear, angular) = (read_vector(linear, "linear")?, read_vector(angular, "angular")?);
-            let mut desc = inner.world.link_desc(link.into())?.clone();
-            (desc.external_acceleration, desc.external_angular_acceleration) = (linear, angular);
-            Ok(inner.world.set_link_desc(link.into(), desc)?)
+            Ok(inner.world.set_external_acceleration(link.into(), &linear, &angular)?)
         })
     }
 }

@@ -66,7 +66,7 @@ pub fn bend(
 pub fn rub(
     grip: &Grip,
     material: &Material,
-    bristle: Option<&mut Bristle>,
+    mut bristle: Option<&mut Bristle>,
     h: f64,
     carriers: &Carriers,
     motions: &mut [Motion],
@@ -93,7 +93,14 @@ pub fn rub(
     if spin_mobility > 0.0 {
         let spin = carriers.spin(motions).dot(&grip.normal) - target.1;
         let limit = limit * grip.radius;
-        let twist = (-spin / spin_mobility).clamp(-limit, limit);
+        let stop = -spin / spin_mobility;
+        let twist = stop.clamp(-limit, limit);
+        if twist != stop
+            && let Some(bristle) = &mut bristle
+        {
+            // It turns on: what has slipped is lost.
+            bristle.turn = 0.0;
+        }
         let impulse = Wrench { force: Vec3::zeros(), torque: grip.normal * twist };
         carriers.push(motions, origin, &grip.position, &impulse);
     }

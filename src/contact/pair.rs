@@ -32,7 +32,7 @@ pub struct Side {
     pub reach: Vec<f64>,
     /// For each skeleton, its link's pose in the pair's frame.
     pub poses: Vec<Pose>,
-    /// For each skeleton, its rays in its link's frame; empty unless the scene samples with seeds.
+    /// For each skeleton, its rays in its link's frame; none for a plane.
     pub rays: Vec<Arc<[Ray]>>,
     /// Field value on the surface.
     pub isovalue: f64,

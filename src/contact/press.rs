@@ -194,6 +194,8 @@ pub fn press(
 /// Dissipation of a patch in one sub-step, with the factors that make it stable at any rate.
 struct Damping {
     dissipation: f64,
+    /// What backward Euler takes off the pressure.
+    relief: f64,
     viscous: f64,
 }
 
@@ -209,10 +211,10 @@ impl Damping {
     ) -> Self {
         let mobility = carriers.mobility(motions, &pair.origin, &elastic.center);
         let along = normal.dot(&(mobility * normal));
-        // Backward Euler for the rate: (1 - d v') with v' = v + W h F (1 - d v').
-        let dissipation = material.dissipation / (1.0 + along * h * elastic.force.norm() * material.dissipation);
+        // Backward Euler for the rate: 1 - d v' with v' = v + W h F (1 - d v') is (1 - d v) / (1 + W h F d).
+        let relief = 1.0 / (1.0 + along * h * elastic.force.norm() * material.dissipation);
         let viscous = material.viscous / (1.0 + mobility.trace() * h * material.viscous * elastic.area);
-        Self { dissipation, viscous }
+        Self { dissipation: material.dissipation, relief, viscous }
     }
 
     /// Force on b at a node where b moves with `slip` relative to a: Hunt-Crossley's `p (1 - d v_n)`, never
@@ -224,7 +226,7 @@ impl Damping {
         }
         let normal = node.force / size;
         let parting = slip.dot(&normal);
-        let pressing = size * (1.0 - self.dissipation * parting).max(0.0);
+        let pressing = size * self.relief * (1.0 - self.dissipation * parting).max(0.0);
         let drag = slip * (-self.viscous * node.area);
         let drag_normal = drag.dot(&normal);
         drag - normal * drag_normal + normal * (pressing + drag_normal).max(0.0)

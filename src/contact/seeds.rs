@@ -58,6 +58,9 @@ pub fn integrate(pair: &Pair, out: &mut Surface) {
     share_out(pair, first, samples, out);
 }
 
+/// How far behind its surface a half-space is searched for the contact surface, in thicknesses.
+const DEEPEST: f64 = 64.0;
+
 /// Follows one ray to the contact surface and adds its node. Gives the evaluations it took.
 fn cast(pair: &Pair, from_a: bool, skeleton: usize, ray: &Ray, nodes: &mut Vec<Node>) -> u32 {
     let own = if from_a { &pair.a } else { &pair.b };
@@ -75,8 +78,8 @@ fn cast(pair: &Pair, from_a: bool, skeleton: usize, ray: &Ray, nodes: &mut Vec<N
         return evaluations;
     }
     let plane = matches!(own.skeletons[skeleton].shape, Shape::Plane { .. });
-    // Rays reach back into a solid core as far as their face is the nearest; a half-space has no end.
-    let (mut low, mut high) = (if plane { outer - 4.0 * profile.thickness } else { -ray.core }, outer);
+    // Rays reach back into a solid core as far as their face is the nearest; a half-space goes on.
+    let (mut low, mut high) = (if plane { outer - DEEPEST * profile.thickness } else { -ray.core }, outer);
     let start = pair.sample(&at(low));
     evaluations += 1;
     if sign * start.difference <= 0.0 {

@@ -125,7 +125,7 @@ impl Profile {
         self.value_slope(0.0).0
     }
 
-    /// The largest slope `|F'|` at any distance: a Lipschitz constant of the field \[model 2\].
+    /// The largest slope `|F'|` at any distance: a Lipschitz constant of the field (docs/model.md, "Profiles").
     pub fn lipschitz(&self) -> f64 {
         let width = self.radius - self.thickness;
         let q = self.stiffness * width / self.isovalue;

@@ -77,7 +77,7 @@ pub struct BodyDesc {
     pub static_friction: f64,
     /// Viscous friction `λ`, at least 0 \[√(N s/m³)\]; a pair uses the product \[97, eq. (20)\].
     pub viscous_friction: f64,
-    /// Hunt-Crossley dissipation, at least 0 \[s/m\]; a pair uses the mean weighted by the other's softness.
+    /// Hunt-Crossley dissipation, at least 0 \[s/m\]; a pair uses the mean weighted by the other's stiffness.
     pub dissipation: f64,
     /// What this body is, as bits.
     pub category: u64,
@@ -143,7 +143,8 @@ pub struct LinkDesc {
     pub velocity_convention: VelocityConvention,
     /// Host-driven links: the host itself applies the gyroscopic torque.
     pub host_gyroscopic: bool,
-    /// Host-driven links: joints or host contacts act on it in this tick.
+    /// Host-driven links: joints or host contacts act on it in this tick. Kept for the automatic choice of the response;
+    /// the responses there are today do not ask.
     pub constrained: bool,
     /// Host-driven links: the 6×6 matrix from wrench at the centre of mass (force, torque) to acceleration (linear,
     /// angular), in the world, where joints change it.

@@ -1,6 +1,6 @@
 //! Gathering: from the nouns of the world to the motions and candidate pairs that the step works on.
 
-use super::{Body, Link, Scheme, Skeleton, World};
+use super::{Body, Link, Skeleton, World};
 use crate::base::{Inertia, Kind, Motion};
 use crate::contact::broad_phase::Bounds;
 use crate::contact::candidate::Candidate;
@@ -61,23 +61,14 @@ impl World {
     }
 
     /// Fills a candidate with what of its bodies can matter within both their bounds. False when nothing can.
-    pub(super) fn fill(
-        &self,
-        candidate: &mut Candidate,
-        motions: &[Motion],
-        bounds: [&Bounds; 2],
-        scheme: Scheme,
-        dt: f64,
-    ) -> bool {
+    pub(super) fn fill(&self, candidate: &mut Candidate, motions: &[Motion], bounds: [&Bounds; 2], dt: f64) -> bool {
         let [a, b] = candidate.bodies.map(|body| &self.bodies[body as usize]);
         if a.desc.rigid && b.desc.rigid {
             return false;
         }
-        // The automatic choice may have to fall back on seeds.
-        let seeds = matches!(scheme, Scheme::Auto | Scheme::Adaptive | Scheme::Polar | Scheme::Seeds);
         let region = (bounds[0].low.sup(&bounds[1].low), bounds[0].high.inf(&bounds[1].high));
-        self.fill_side(&mut candidate.pair.a, a, motions, &region, seeds, dt);
-        self.fill_side(&mut candidate.pair.b, b, motions, &region, seeds, dt);
+        self.fill_side(&mut candidate.pair.a, a, motions, &region, dt);
+        self.fill_side(&mut candidate.pair.b, b, motions, &region, dt);
         if candidate.pair.a.locals.is_empty() || candidate.pair.b.locals.is_empty() {
             return false;
         }
@@ -90,7 +81,7 @@ impl World {
         true
     }
 
-    fn fill_side(&self, side: &mut Side, body: &Body, motions: &[Motion], region: &(Vec3, Vec3), seeds: bool, dt: f64) {
+    fn fill_side(&self, side: &mut Side, body: &Body, motions: &[Motion], region: &(Vec3, Vec3), dt: f64) {
         side.clear();
         side.isovalue = body.desc.isovalue;
         side.stiffness_scale = body.desc.stiffness_scale;
@@ -107,9 +98,7 @@ impl World {
             side.links.push(link);
             side.ids.push(index);
             side.reach.push(skeleton.reach);
-            if seeds {
-                side.rays.push(skeleton.rays(self.desc.seed_count));
-            }
+            side.rays.push(skeleton.rays(self.desc.seed_count));
         }
     }
 

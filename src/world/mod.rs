@@ -194,7 +194,11 @@ impl World {
 
     /// Takes a body out of the simulation, or puts it back.
     pub fn set_body_enabled(&mut self, id: BodyId, enabled: bool) -> Result<()> {
-        self.bodies.get_mut(id)?.enabled = enabled;
+        let body = self.bodies.get_mut(id)?;
+        body.enabled = enabled;
+        for link in &body.links {
+            self.links[*link as usize].mirror = Mirror::default();
+        }
         Ok(())
     }
 
@@ -256,6 +260,9 @@ impl World {
     pub fn set_link_desc(&mut self, id: LinkId, mut desc: LinkDesc) -> Result<()> {
         desc.validate()?;
         desc.pose.rotation.renormalize();
+        for skeleton in &self.links.get(id)?.skeletons {
+            check_plane(&self.skeletons[*skeleton as usize].desc, desc.kind)?;
+        }
         let link = self.links.get_mut(id)?;
         if desc.kind != link.desc.kind {
             link.mirror = Mirror::default();
@@ -323,9 +330,7 @@ impl World {
     fn check_skeleton(&self, link: LinkId, desc: &SkeletonDesc) -> Result<Profile> {
         let link = self.links.get(link)?;
         let profile = desc.profile(self.bodies[link.body as usize].desc.isovalue)?;
-        if matches!(desc.shape, crate::field::Shape::Plane { .. }) && link.desc.kind != Kind::Fixed {
-            return Err(Error::Unsupported("a plane is for fixed links: it has no bounds to move"));
-        }
+        check_plane(desc, link.desc.kind)?;
         Ok(profile)
     }
 
@@ -380,6 +385,13 @@ impl World {
     }
 }
 
+fn check_plane(desc: &SkeletonDesc, kind: Kind) -> Result<()> {
+    if matches!(desc.shape, crate::field::Shape::Plane { .. }) && kind != Kind::Fixed {
+        return Err(Error::Unsupported("a plane is for fixed links: it has no bounds to move"));
+    }
+    Ok(())
+}
+
 /// States and forces.
 impl World {
     /// Pose and twist of a link.
@@ -404,6 +416,16 @@ impl World {
     pub fn teleport_link(&mut self, id: LinkId, state: &LinkState) -> Result<()> {
         self.set_link_state(id, state)?;
         self.links.get_mut(id)?.mirror = Mirror::default();
+        Ok(())
+    }
+
+    /// Sets the accelerations of a link besides gravity and contact \[m/s², rad/s²\]: for hosts that say every tick what
+    /// they will do.
+    pub fn set_external_acceleration(&mut self, id: LinkId, linear: &Vec3, angular: &Vec3) -> Result<()> {
+        require_finite("external_acceleration", linear)?;
+        require_finite("external_angular_acceleration", angular)?;
+        let desc = &mut self.links.get_mut(id)?.desc;
+        (desc.external_acceleration, desc.external_angular_acceleration) = (*linear, *angular);
         Ok(())
     }
 

@@ -133,7 +133,7 @@ impl World {
             };
             candidate.bodies = *pair;
             let bounds = pair.map(|body| &state.bounds[state.bounds_of[body as usize]]);
-            if self.fill(&mut candidate, &state.motions, bounds, self.desc.scheme, dt) {
+            if self.fill(&mut candidate, &state.motions, bounds, dt) {
                 candidate.memory.touched = false;
                 state.candidates.push(candidate);
             } else if known {
@@ -415,7 +415,7 @@ impl World {
         let bounds = [a, b].map(|body| self.bounds_of(body.index(), &motions, 0.0));
         let mut contacts = Vec::new();
         let [Some(first), Some(second)] = &bounds else { return Ok(contacts) };
-        if self.fill(&mut candidate, &motions, [first, second], scheme, 0.0) {
+        if self.fill(&mut candidate, &motions, [first, second], 0.0) {
             candidate.pair.place(&motions, candidate.lead);
             let settings = surface::Settings { scheme, tolerance };
             surface::integrate(&candidate.pair, &settings, &mut candidate.surface);

@@ -75,7 +75,7 @@ fn carried(placed: &Placed, slope: f64) -> f64 {
         Shape::Triangle(a, b, c) => {
             corner + edge * (b - a).norm() + slope * sink * 0.5 * (b - a).cross(&(c - a)).norm()
         }
-        Shape::Box { half, .. } => corner + slope * sink * 4.0 * half.x * half.y * half.z / half.max(),
+        Shape::Box { half, .. } => corner + slope * sink * 4.0 * half.x * half.y * half.z / half.min(),
         Shape::Plane { .. } => f64::INFINITY,
     }
 }
