@@ -105,7 +105,10 @@ pub fn rotation_to_vector(q: &Quat) -> Vec3 {
 
 /// Rotates `q` by the angular velocity `w` for `dt` seconds.
 pub fn advance_rotation(q: &Quat, w: &Vec3, dt: f64) -> Quat {
-    rotation_from_vector(&(w * dt)) * q
+    let mut turned = rotation_from_vector(&(w * dt)) * q;
+    // Products drift off unit length, step by step in the same direction.
+    turned.renormalize_fast();
+    turned
 }
 
 /// Two unit vectors that complete the unit vector `n` to a right-handed frame `(e1, e2, n)`; continuous in `n` away

@@ -425,7 +425,7 @@ typedef struct isocoat_body_desc {
     /** Viscous friction, in sqrt(N s/m^3), at least 0; a pair takes the product. Default 0. */
     double viscous_friction;
     /**
-     * Hunt-Crossley dissipation, in s/m, at least 0; a pair takes the mean weighted by the other's softness.
+     * Hunt-Crossley dissipation, in s/m, at least 0; a pair takes the mean weighted by the other's stiffness.
      * Default 0.
      */
     double dissipation;
