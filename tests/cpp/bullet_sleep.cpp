@@ -65,6 +65,21 @@ void stays_asleep(int ticks) {
     world.dynamics->addRigidBody(bodies[0]);
 }
 
+void notices_what_isocoat_loses(int ticks) {
+    // With everything asleep, the host takes the floor's coat away.
+    scene world;
+    btRigidBody *floor = world.add_floor(lossy);
+    btRigidBody *ball = world.add_ball(btVector3(0, btScalar(0.5), 0), lossy);
+    bool together;
+    until_asleep(world, {ball}, ticks, together);
+    world.frames(100, ticks);
+    const btScalar before = ball->getCenterOfMassPosition().y();
+    must(isocoat_link_set_enabled(world.coats, world.coupler->link_of(floor), false));
+    world.frames(100, ticks);
+    const double fallen = double(before - ball->getCenterOfMassPosition().y());
+    expect(fallen > 1, "%d tick(s): a floor whose coat is disabled lets a sleeping ball fall: %.2f m", ticks, fallen);
+}
+
 void woken_by_a_landing(int ticks) {
     scene world;
     world.add_floor(lossy);
@@ -151,6 +166,7 @@ void lifted_by_a_platform(int ticks) {
 int main() {
     for (const int ticks : {1, 2, 4}) {
         stays_asleep(ticks);
+        notices_what_isocoat_loses(ticks);
         woken_by_a_landing(ticks);
         lifted_by_a_platform(ticks);
         for (const double stiffness_scale : {1e4, 1e6, 1e8}) {
