@@ -84,12 +84,12 @@ $(call compile_each,$(CPP_TESTS),$(WORK)/tests/cpp,-float,$(call bullet_line,bul
 $(call compile_each,$(CPP_TESTS),$(WORK)/tests/cpp,-double,$\
 	$(call bullet_line,bullet-float64),$(call bullet_libs,bullet-float64))
 $(call compile_each,$(C_EXAMPLES),$(WORK)/examples,,$(call c_line))
-$(call compile_each,$(CPP_EXAMPLES),$(WORK)/examples,,$(call bullet_line,bullet),$(call bullet_libs,bullet))
+$(call compile_each,$(CPP_EXAMPLES),$(WORK)/examples/cpp,,$(call bullet_line,bullet),$(call bullet_libs,bullet))
 
 C_TEST_BINS      := $(call named,$(C_TESTS),$(WORK)/tests/c)
 C_TEST_BINS_ASAN := $(addsuffix -asan,$(C_TEST_BINS))
 BULLET_BINS      := $(foreach kind,float double,$(call named,$(CPP_TESTS),$(WORK)/tests/cpp,-$(kind)))
-EXAMPLE_BINS     := $(call named,$(C_EXAMPLES) $(CPP_EXAMPLES),$(WORK)/examples)
+EXAMPLE_BINS     := $(call named,$(C_EXAMPLES),$(WORK)/examples) $(call named,$(CPP_EXAMPLES),$(WORK)/examples/cpp)
 
 # ---- demo ------------------------------------------------------------------------------------------------------------
 
@@ -106,7 +106,7 @@ demo-c: $(WORK)/examples/two_balls
 demo-bullet:
 	@printf '\n== A pile, with Bullet (examples/cpp/bullet_drop.cpp)\n'
 	@if command -v $(CXX) >/dev/null && $(PKG_CONFIG) --exists bullet 2>/dev/null; then \
-		$(MAKE) $(WORK)/examples/bullet_drop && $(WORK)/examples/bullet_drop; \
+		$(MAKE) $(WORK)/examples/cpp/bullet_drop && $(WORK)/examples/cpp/bullet_drop; \
 	else \
 		echo 'Skipped: Bullet (libbullet-dev), a C++ compiler or pkg-config is missing, and could not be installed.'; \
 	fi

@@ -334,8 +334,8 @@ inline void ignore_core(btRigidBody &a, btRigidBody &b, bool ignore = true) {
     b.setIgnoreCollisionCheck(&a, ignore);
 }
 
-/// Switches on Bullet's continuous collision detection of a body's shape against the plain world. Coats need none: isocoat
-/// sub-steps fast contacts itself.
+/// Switches on Bullet's continuous collision detection of a body's shape against the plain world. Coats need none:
+/// isocoat sub-steps fast contacts itself.
 ///
 /// - radius: of a sphere inside the shape, in m; the body is swept when it moves by more than that in a tick.
 inline void enable_ccd(btRigidBody &body, btScalar radius) {
@@ -368,17 +368,16 @@ public:
         if (body == nullptr || is_attached(body)) {
             throw std::runtime_error(body ? "isocoat: the body is attached already" : "isocoat: the body is NULL");
         }
-        for (const attachment &other : entries_) {
-            if (same(other.link, link)) {
-                throw std::runtime_error("isocoat: the link is attached to another body");
-            }
+        if (position_of(link) < entries_.size()) {
+            throw std::runtime_error("isocoat: the link is attached to another body");
         }
         attachment fresh;
         fresh.body = body;
         fresh.link = link;
         describe(fresh);
+        of_body_[body] = entries_.size();
+        of_link_[link.index] = entries_.size();
         entries_.push_back(fresh);
-        index();
     }
 
     /// Unties a body; false when it was not attached. The link stays as it is: destroy or disable it, or attach it
@@ -457,7 +456,7 @@ private:
         detail::motion told;
         /// Accelerations as isocoat was told.
         detail::motion expected;
-        /// Sleeping bodies: what gravity and contacts usually add to the velocities in a tick, and what came beyond that.
+        /// Sleeping bodies: what gravity and contacts usually add to the velocities in a tick; what came beyond.
         detail::motion usual;
         detail::motion owed;
         /// Kinematic bodies: where it glides to, from where, and since when.
@@ -526,7 +525,6 @@ private:
         gather(dt);
         if (!push_states()) {
             drop_stale_links();
-            gather(dt);
             if (!push_states()) {
                 throw std::runtime_error("isocoat: states refused: " + detail::last_error());
             }
@@ -556,7 +554,6 @@ private:
         links_.clear();
         states_.clear();
         movers_.clear();
-        found_.resize(entries_.size(), 0);
         for (std::size_t i = 0; i < entries_.size(); ++i) {
             attachment &entry = entries_[i];
             isocoat_link_state state{};
@@ -685,22 +682,39 @@ private:
     }
 
     bool push_states() {
-        const isocoat_status status = isocoat_world_set_link_states(world_, links_.data(), states_.data(), links_.size());
+        const isocoat_status status =
+            isocoat_world_set_link_states(world_, links_.data(), states_.data(), links_.size());
         if (status != ISOCOAT_OK && status != ISOCOAT_ERROR_INVALID_HANDLE) {
             throw std::runtime_error("isocoat: states refused: " + detail::last_error());
         }
         return status == ISOCOAT_OK;
     }
 
-    /// Links that were destroyed are detached.
+    /// Links that were destroyed are detached, and left out of this tick.
     void drop_stale_links() {
-        const auto stale = [this](const attachment &entry) {
+        std::vector<attachment> live;
+        std::vector<std::size_t> now(entries_.size(), entries_.size());
+        for (std::size_t i = 0; i < entries_.size(); ++i) {
             isocoat_link_state state;
-            return isocoat_link_get_state(world_, entry.link, &state) == ISOCOAT_ERROR_INVALID_HANDLE;
-        };
-        entries_.erase(std::remove_if(entries_.begin(), entries_.end(), stale), entries_.end());
+            if (isocoat_link_get_state(world_, entries_[i].link, &state) != ISOCOAT_ERROR_INVALID_HANDLE) {
+                now[i] = live.size();
+                live.push_back(entries_[i]);
+            }
+        }
+        std::size_t kept = 0;
+        for (std::size_t i = 0; i < movers_.size(); ++i) {
+            if (now[movers_[i]] < entries_.size()) {
+                links_[kept] = links_[i];
+                states_[kept] = states_[i];
+                movers_[kept] = now[movers_[i]];
+                ++kept;
+            }
+        }
+        links_.resize(kept);
+        states_.resize(kept);
+        movers_.resize(kept);
+        entries_ = std::move(live);
         index();
-        find_present();
     }
 
     /// Whether the step can be left out because it would repeat the last one: the isocoat world holds nothing but
@@ -837,8 +851,9 @@ private:
         for (const std::size_t i : movers_) {
             const attachment &entry = entries_[i];
             const int state = is_mover(i) ? entry.body->getActivationState() : ISLAND_SLEEPING;
-            const bool drowsy = state == ISLAND_SLEEPING || state == WANTS_DEACTIVATION || state == DISABLE_SIMULATION ||
-                                (state == ACTIVE_TAG && entry.body->getDeactivationTime() > ready);
+            const bool drowsy =
+                state == ISLAND_SLEEPING || state == WANTS_DEACTIVATION || state == DISABLE_SIMULATION ||
+                (state == ACTIVE_TAG && entry.body->getDeactivationTime() > ready);
             if (entry.busy || !drowsy) {
                 entries_[root_of(i)].busy = true;
             }

@@ -55,8 +55,6 @@ pub struct Integrated {
     pub evaluations: u32,
     /// Its frame.
     pub frame: Frame,
-    /// The cells of the first grid that hold contact, in order.
-    pub cells: Vec<(i32, i32)>,
 }
 
 /// The surface leans over somewhere: it is no height over one plane.
@@ -70,7 +68,8 @@ pub fn grid_cell(x: f64, y: f64) -> (i32, i32) {
     ((x / GRID).round() as i32, (y / GRID).round() as i32)
 }
 
-/// Integrates the connected patch that holds a deepest point, appending to `nodes`.
+/// Integrates the connected patch that holds a deepest point, appending to `nodes`, and to `cells` those
+/// of the first grid that hold contact, in order.
 pub fn integrate(
     pair: &Pair,
     at: &Deepest,
@@ -78,6 +77,7 @@ pub fn integrate(
     tolerance: f64,
     workspace: &mut Workspace,
     nodes: &mut Vec<Node>,
+    cells: &mut Vec<(i32, i32)>,
 ) -> Result<Integrated, LeansOver> {
     let mut solver = Solver { pair, frame: Frame::new(at, [1.0, 1.0]), accept: 0.0, border_step: 0.0, evaluations: 0 };
     solver.aim(at.sum, tolerance);
@@ -98,9 +98,10 @@ pub fn integrate(
     for cell in workspace.cells.iter().filter(|cell| !cell.split) {
         nodes.extend_from_slice(&workspace.pool[cell.nodes.0..cell.nodes.1]);
     }
-    let mut cells: Vec<_> = workspace.visited.iter().filter(|(_, active)| **active).map(|(key, _)| *key).collect();
-    cells.sort_unstable();
-    Ok(Integrated { error, evaluations, frame, cells })
+    let first = cells.len();
+    cells.extend(workspace.visited.iter().filter(|(_, active)| **active).map(|(key, _)| *key));
+    cells[first..].sort_unstable();
+    Ok(Integrated { error, evaluations, frame })
 }
 
 struct Work<'a, 'b> {

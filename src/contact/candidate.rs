@@ -88,6 +88,9 @@ impl Candidate {
             return false;
         }
         for patch in &self.surface.patches {
+            if patch.nodes.0 >= patch.nodes.1 {
+                return false;
+            }
             let depth = patch.peak_pressure / self.pair.scale / patch.slope;
             let size = (patch.deepest - self.surface.nodes[patch.nodes.0].position).norm();
             let limit = KEEP * tolerance.sqrt() * depth;

@@ -139,8 +139,6 @@ pub struct Integrated {
     pub evaluations: u32,
     /// Its frame.
     pub frame: Frame,
-    /// For each azimuth, the radius of the border in the frame's units.
-    pub border: Vec<f64>,
 }
 
 /// Why the polar patch is not the right scheme here.
@@ -149,7 +147,8 @@ pub struct NotStarShaped {
     pub evaluations: u32,
 }
 
-/// Integrates the patch round a deepest point to a relative `tolerance`, appending to `nodes`. At the finest level the
+/// Integrates the patch round a deepest point to a relative `tolerance`, appending to `nodes`, and to `border` the
+/// radius of the border at each azimuth, in the frame's units. At the finest level the
 /// result stands, with its estimate, when `last_resort` is set.
 pub fn integrate(
     pair: &Pair,
@@ -158,15 +157,17 @@ pub fn integrate(
     tolerance: f64,
     last_resort: bool,
     nodes: &mut Vec<Node>,
+    border: &mut Vec<f64>,
 ) -> Result<Integrated, NotStarShaped> {
-    let first = nodes.len();
+    let (first, first_border) = (nodes.len(), border.len());
     let mut solver = Solver { pair, frame: Frame::new(at, [1.0, 1.0]), accept: 0.0, border_step: 0.0, evaluations: 0 };
     solver.aim(at.sum, tolerance);
-    let fail = |evaluations, nodes: &mut Vec<Node>| {
+    let fail = |evaluations, nodes: &mut Vec<Node>, border: &mut Vec<f64>| {
         nodes.truncate(first);
+        border.truncate(first_border);
         Err(NotStarShaped { evaluations })
     };
-    let Some(fit) = solver.fit(at, extent) else { return fail(solver.evaluations, nodes) };
+    let Some(fit) = solver.fit(at, extent) else { return fail(solver.evaluations, nodes, border) };
     // The differences are those of coarser rules. A smooth patch is at least four times better; corners are not.
     let trust = if fit == Fit::Predicted { 0.25 } else { 1.0 };
     let start = match tolerance {
@@ -175,25 +176,24 @@ pub fn integrate(
         t if t >= 2e-4 => 2,
         _ => 3,
     };
-    let mut border = Vec::new();
     for (index, (azimuths, rule)) in LEVELS.iter().enumerate().skip(start) {
         nodes.truncate(first);
-        border.clear();
-        let Some(error) = sweep(&mut solver, at.sum, *azimuths, &RULES[*rule], &mut border, nodes) else {
-            return fail(solver.evaluations, nodes);
+        border.truncate(first_border);
+        let Some(error) = sweep(&mut solver, at.sum, *azimuths, &RULES[*rule], border, nodes) else {
+            return fail(solver.evaluations, nodes, border);
         };
         // The roots are solved to a part of the tolerance.
         let error = trust * error + SOLVING * tolerance;
         let last = index + 1 == LEVELS.len();
         if error <= tolerance || last && last_resort {
-            return Ok(Integrated { error, evaluations: solver.evaluations, frame: solver.frame, border });
+            return Ok(Integrated { error, evaluations: solver.evaluations, frame: solver.frame });
         }
         // Algebraic convergence does not pay here: leave it to the subdivision.
         if !last_resort && error > 30.0 * tolerance {
             break;
         }
     }
-    fail(solver.evaluations, nodes)
+    fail(solver.evaluations, nodes, border)
 }
 
 /// Integrates with one rule. Gives how far, relatively, half the azimuths and the coarser radii are off, or `None` when the patch is not star-shaped.

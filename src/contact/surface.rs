@@ -34,39 +34,18 @@ pub struct Surface {
     pub evaluations: u32,
     maxima: Vec<Deepest>,
     covered: Vec<Covered>,
+    borders: Vec<f64>,
+    cells: Vec<(i32, i32)>,
     workspace: adaptive::Workspace,
 }
 
 /// A region of the surface that a patch already accounts for.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 enum Covered {
-    /// Within the border found at equally spaced azimuths.
-    Polar(Frame, Vec<f64>),
-    /// Within these cells of the first grid, in order.
-    Cells(Frame, Vec<(i32, i32)>),
-}
-
-impl Covered {
-    /// Whether a point of the surface lies within the region.
-    fn contains(&self, p: &Vec3) -> bool {
-        let (Covered::Polar(frame, _) | Covered::Cells(frame, _)) = self;
-        let (x, y, height) = frame.coordinates(p);
-        let size = frame.scale[0].max(frame.scale[1]);
-        match self {
-            Covered::Polar(_, border) => {
-                let count = border.len() as f64;
-                let turn = libm::atan2(y, x) / (2.0 * std::f64::consts::PI) * count - 0.5;
-                let below = turn.floor();
-                let at = |i: f64| border[i.rem_euclid(count) as usize];
-                let limit = at(below) + (turn - below) * (at(below + 1.0) - at(below));
-                x.hypot(y) < 1.02 * limit && height.abs() < size * limit
-            }
-            Covered::Cells(_, cells) => {
-                let reach = cells.iter().map(|(i, j)| i.abs().max(j.abs())).max().unwrap_or(0);
-                cells.binary_search(&adaptive::grid_cell(x, y)).is_ok() && height.abs() < size * f64::from(reach + 1)
-            }
-        }
-    }
+    /// Within the border found at equally spaced azimuths: a range of `borders`.
+    Polar(Frame, (usize, usize)),
+    /// Within cells of the first grid, in order: a range of `cells`.
+    Cells(Frame, (usize, usize)),
 }
 
 /// Finds and integrates the contact surface of a pair.
@@ -76,6 +55,8 @@ pub fn integrate(pair: &Pair, settings: &Settings, out: &mut Surface) {
     out.overloads.clear();
     out.maxima.clear();
     out.covered.clear();
+    out.borders.clear();
+    out.cells.clear();
     out.evaluations = 0;
     for i in 0..pair.a.skeletons.len() {
         for j in 0..pair.b.skeletons.len() {
@@ -105,7 +86,7 @@ pub fn integrate(pair: &Pair, settings: &Settings, out: &mut Surface) {
     let extent = extent(&pair.a).min(extent(&pair.b));
     for index in 0..out.maxima.len() {
         let at = out.maxima[index];
-        if out.covered.iter().any(|region| region.contains(&at.position)) {
+        if out.covered.iter().any(|region| out.contains(region, &at.position)) {
             continue;
         }
         if !patch(pair, settings, &at, extent, out) {
@@ -122,6 +103,29 @@ impl Surface {
     /// The maxima found by the last integration, the deepest first.
     pub fn maxima(&self) -> &[Deepest] {
         &self.maxima
+    }
+
+    /// Whether a point of the surface lies within a region.
+    fn contains(&self, region: &Covered, p: &Vec3) -> bool {
+        let (Covered::Polar(frame, range) | Covered::Cells(frame, range)) = region;
+        let (x, y, height) = frame.coordinates(p);
+        let size = frame.scale[0].max(frame.scale[1]);
+        match region {
+            Covered::Polar(..) => {
+                let border = &self.borders[range.0..range.1];
+                let count = border.len() as f64;
+                let turn = libm::atan2(y, x) / (2.0 * std::f64::consts::PI) * count - 0.5;
+                let below = turn.floor();
+                let at = |i: f64| border[i.rem_euclid(count) as usize];
+                let limit = at(below) + (turn - below) * (at(below + 1.0) - at(below));
+                x.hypot(y) < 1.02 * limit && height.abs() < size * limit
+            }
+            Covered::Cells(..) => {
+                let cells = &self.cells[range.0..range.1];
+                let reach = cells.iter().map(|(i, j)| i.abs().max(j.abs())).max().unwrap_or(0);
+                cells.binary_search(&adaptive::grid_cell(x, y)).is_ok() && height.abs() < size * f64::from(reach + 1)
+            }
+        }
     }
 
     /// What each patch comes to.
@@ -151,22 +155,24 @@ impl Surface {
 /// Integrates the patch round a maximum. False when its surface leans over and no height can describe it.
 fn patch(pair: &Pair, settings: &Settings, at: &Deepest, extent: f64, out: &mut Surface) -> bool {
     let first = out.nodes.len();
+    let (first_border, first_cell) = (out.borders.len(), out.cells.len());
     let mut spent = 0;
     if settings.scheme != Scheme::Adaptive {
         let forced = settings.scheme == Scheme::Polar;
-        match polar::integrate(pair, at, extent, settings.tolerance, forced, &mut out.nodes) {
+        match polar::integrate(pair, at, extent, settings.tolerance, forced, &mut out.nodes, &mut out.borders) {
             Ok(done) => {
                 out.push(at, first, pair.scale, done.error, done.evaluations, Scheme::Polar);
-                out.covered.push(Covered::Polar(done.frame, done.border));
+                out.covered.push(Covered::Polar(done.frame, (first_border, out.borders.len())));
                 return true;
             }
             Err(polar::NotStarShaped { evaluations }) => spent = evaluations,
         }
     }
-    match adaptive::integrate(pair, at, extent, settings.tolerance, &mut out.workspace, &mut out.nodes) {
+    match adaptive::integrate(pair, at, extent, settings.tolerance, &mut out.workspace, &mut out.nodes, &mut out.cells)
+    {
         Ok(done) => {
             out.push(at, first, pair.scale, done.error, done.evaluations + spent, Scheme::Adaptive);
-            out.covered.push(Covered::Cells(done.frame, done.cells));
+            out.covered.push(Covered::Cells(done.frame, (first_cell, out.cells.len())));
             true
         }
         Err(adaptive::LeansOver { evaluations }) => {

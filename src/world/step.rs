@@ -123,7 +123,9 @@ impl World {
             while old < state.previous.len() && state.previous[old].bodies < *pair {
                 old += 1;
             }
-            let known = old < state.previous.len() && state.previous[old].bodies == *pair;
+            // A body that took over the slot of a destroyed one is another body.
+            let ids = pair.map(|body| self.bodies.id_of(body as usize).raw);
+            let known = state.previous.get(old).is_some_and(|last| last.bodies == *pair && last.memory.ids == ids);
             let mut candidate = if known {
                 std::mem::take(&mut state.previous[old])
             } else {

@@ -20,8 +20,8 @@ void fall(int ticks) {
         scenes[i]->add_floor();
         bodies[i][0] = scenes[i]->add_ball(btVector3(0, 40, 0));
         bodies[i][1] = scenes[i]->add_coated(
-            2, btVector3(3, 41, 0), std::make_unique<btBoxShape>(btVector3(btScalar(0.5), btScalar(0.3), btScalar(0.7))),
-            material());
+            2, btVector3(3, 41, 0),
+            std::make_unique<btBoxShape>(btVector3(btScalar(0.5), btScalar(0.3), btScalar(0.7))), material());
         bodies[i][0]->setLinearVelocity(btVector3(1, 2, btScalar(0.3)));
         bodies[i][1]->setAngularVelocity(btVector3(1, btScalar(0.2), 3));
         bodies[i][1]->setDamping(btScalar(0.1), btScalar(0.2));

@@ -72,7 +72,8 @@ void mixed_pile() {
     bool inside = true;
     for (const btRigidBody *ball : balls) {
         const btVector3 at = ball->getCenterOfMassPosition();
-        inside = inside && std::abs(at.x()) < btScalar(1.5) && std::abs(at.z()) < btScalar(1.5) && at.y() > btScalar(0.3);
+        const bool between = std::abs(at.x()) < btScalar(1.5) && std::abs(at.z()) < btScalar(1.5);
+        inside = inside && between && at.y() > btScalar(0.3);
     }
     expect(inside && most < 1.01 * first && last < first && fastest < 0.4,
            "12 coated balls among plain walls: energy from %.2f J, never above %.2f, to %.2f; fastest %.3f m/s", first,
@@ -154,7 +155,8 @@ void damped() {
     }
     const double sink = 0.5 - double(free->getCenterOfMassPosition().y());
     expect(std::abs(0.5 - low - sink) < 0.05 * sink && high - low < 0.02 * sink,
-           "damped by 0.9 a second, a ball sinks %.5f m, moving by %.1e m; without, %.5f m", 0.5 - low, high - low, sink);
+           "damped by 0.9 a second, a ball sinks %.5f m, moving by %.1e m; without, %.5f m", 0.5 - low, high - low,
+           sink);
 }
 
 /// A box that tumbles over coats: Bullet turns it with the gyroscopic torque or without.
@@ -175,8 +177,8 @@ void tumbling(int flags, const char *name) {
             most = std::max(most, kinetic(*body) + 10 * double(body->getCenterOfMassPosition().y()));
         }
     }
-    expect(most < 1.1 * before, "a capsule tumbles, gyroscopic torque %s: %.2f J at first, at most %.2f over 10 s", name,
-           before, most);
+    expect(most < 1.1 * before, "a capsule tumbles, gyroscopic torque %s: %.2f J at first, at most %.2f over 10 s",
+           name, before, most);
 }
 
 }  // namespace

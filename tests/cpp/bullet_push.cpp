@@ -46,8 +46,8 @@ void kick(int ticks, const material &made_of, const char *what) {
     at.ball->applyCentralImpulse(btVector3(btScalar(impulse), 0, 0));
     at.world.frames(30, ticks);
     const double gain = double(at.ball->getLinearVelocity().x()) * mass / impulse;
-    expect(std::abs(gain - 1) < 0.02, "%s, %d tick(s): impulse: velocity / (J/m) = %.5f, height off %.2e m", what, ticks,
-           gain, at.drift());
+    expect(std::abs(gain - 1) < 0.02, "%s, %d tick(s): impulse: velocity / (J/m) = %.5f, height off %.2e m", what,
+           ticks, gain, at.drift());
 }
 
 void press(int ticks, const material &made_of, const char *what) {

@@ -49,8 +49,9 @@ void teleport(const place &to, int ticks, double stiffness_scale) {
         worst = std::max(worst, std::abs(a[i] - b[i]));
     }
     // An announced jump within one contact keeps the contact's number of sub-steps.
-    expect(worst < (to.announced ? 1e-3 : 1e-9), "%s, %.0e Pa, %d tick(s): differs by %.2e m from a new ball over 2 s", to.name,
-           stiffness_scale, ticks, worst);
+    expect(worst < (to.announced ? 1e-3 : 1e-9),
+           "%s, %.0e Pa, %d tick(s): differs by %.2e m from a new ball over 2 s", to.name, stiffness_scale, ticks,
+           worst);
 }
 
 }  // namespace

@@ -1,0 +1,125 @@
+//! A world at work does not ask for memory: once its buffers have grown to what a scene needs, steps reuse them.
+
+mod common;
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+use common::{Coat, ball_inertia, box_inertia};
+use isocoat::base::Kind;
+use isocoat::field::Shape;
+use isocoat::math::{Pose, Vec3};
+use isocoat::world::{BodyDesc, LinkDesc, Scheme, World, WorldDesc};
+
+thread_local! {
+    static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
+    static TRACED: Cell<bool> = const { Cell::new(false) };
+}
+
+/// The system's allocator, which counts what each thread asks for.
+struct Counting;
+
+fn count() {
+    let count = ALLOCATIONS.get() + 1;
+    // A failure says where: the first allocation of a counted stretch leaves its backtrace.
+    if TRACED.replace(false) {
+        eprintln!("{}", std::backtrace::Backtrace::force_capture());
+    }
+    // The backtrace's own do not count.
+    ALLOCATIONS.set(count);
+}
+
+// SAFETY: all requests go to the system's allocator unchanged.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        count();
+        // SAFETY: the caller's promises are passed on.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
+        count();
+        // SAFETY: the caller's promises are passed on.
+        unsafe { System.alloc_zeroed(layout) }
+    }
+
+    unsafe fn realloc(&self, block: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        count();
+        // SAFETY: the caller's promises are passed on.
+        unsafe { System.realloc(block, layout, size) }
+    }
+
+    unsafe fn dealloc(&self, block: *mut u8, layout: Layout) {
+        // SAFETY: the caller's promises are passed on.
+        unsafe { System.dealloc(block, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+/// Balls laid on a floor; unless `round`, also capsules, and a box with a ball on top.
+fn resting_scene(scheme: Scheme, round: bool) -> World {
+    let gravity = Vec3::new(0.0, 0.0, -9.81);
+    let mut world = World::new(WorldDesc { gravity, scheme, force_tolerance: 5e-2, ..WorldDesc::default() }).unwrap();
+    let rough = |coat: &Coat| BodyDesc {
+        friction: 0.3,
+        static_friction: 0.3,
+        dissipation: 0.5,
+        viscous_friction: 0.1,
+        ..coat.body_desc()
+    };
+    let floor = Coat::floor(0.1).hard();
+    floor.add(&mut world, rough(&floor), LinkDesc { pose: Pose::at(0.0, 0.0, -0.1), ..LinkDesc::default() });
+    let ball = Coat::ball(0.1);
+    let capsule = Coat::new(&[Shape::Segment(Vec3::new(-0.15, 0.0, 0.0), Vec3::new(0.15, 0.0, 0.0))], 0.1);
+    let half = Vec3::new(0.15, 0.15, 0.1);
+    let cuboid = Coat::cuboid(half - Vec3::repeat(0.05), 0.05);
+    let mut lay = |coat: &Coat, x: f64, y: f64, z: f64, inertia| {
+        let desc = LinkDesc { kind: Kind::Rigid, mass: 1.0, inertia, pose: Pose::at(x, y, z), ..LinkDesc::default() };
+        coat.add(&mut world, rough(coat), desc);
+    };
+    for i in 0..4 {
+        lay(&ball, 0.195 * f64::from(i), 0.0, 0.098, ball_inertia(1.0, 0.1));
+    }
+    if round {
+        return world;
+    }
+    for i in 0..3 {
+        lay(&capsule, 0.0, 0.5 + 0.198 * f64::from(i), 0.099, ball_inertia(1.0, 0.15));
+    }
+    lay(&cuboid, 1.0, 1.0, 0.0995, box_inertia(1.0, half));
+    lay(&ball, 1.0, 1.0, 0.298, ball_inertia(1.0, 0.1));
+    world
+}
+
+/// Allocations in a second of a scene that has been at work for a second.
+fn allocations(mut world: World, patches: u32) -> u64 {
+    for _ in 0..60 {
+        world.step(1.0 / 60.0).unwrap();
+    }
+    let before = ALLOCATIONS.get();
+    TRACED.set(true);
+    for _ in 0..60 {
+        world.step(1.0 / 60.0).unwrap();
+    }
+    TRACED.set(false);
+    let count = ALLOCATIONS.get() - before;
+    assert!(world.counters().patches >= patches, "{:?}", world.counters());
+    count
+}
+
+#[test]
+fn a_step_of_resting_balls_allocates_nothing() {
+    assert_eq!(allocations(resting_scene(Scheme::Auto, true), 4), 0);
+}
+
+#[test]
+fn a_step_of_a_mixed_resting_scene_allocates_nothing() {
+    let counts = [Scheme::Auto, Scheme::Polar, Scheme::Adaptive].map(|scheme| {
+        let count = allocations(resting_scene(scheme, false), 9);
+        println!("{scheme:?}: {count} allocations in 60 steps");
+        count
+    });
+    assert_eq!(counts, [0; 3]);
+}
