@@ -234,7 +234,7 @@ proptest! {
                 let rival = (0..fields.len()).filter(|k| *k != own).map(|k| fields[k]).fold(0.0, f64::max);
                 let sum: f64 = fields.iter().sum();
                 if seed.valid {
-                    prop_assert!((sum - 1.0).abs() < 1e-9 && fields[own] >= rival - 1e-9);
+                    prop_assert!((sum - 1.0).abs() < 1e-10 && fields[own] >= rival - 1e-9, "{} {} {}", sum - 1.0, fields[own], rival);
                 } else {
                     // On the border or behind it from the start, inside the solid.
                     prop_assert!(sum >= 1.0 - 1e-9 && fields[own] <= rival + 1e-9, "{own} {fields:?} {sum}");

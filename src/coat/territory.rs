@@ -100,7 +100,14 @@ pub fn follow(coat: &Coat, index: usize, neighbours: &[usize], ray: &Ray) -> (f6
         // A ray may leave the solid just before it enters another territory: the surface then comes first.
         let (end, at_end) = border.map_or((next, ahead.excess), |border| (border, look(border).excess));
         if at_end < 0.0 && end > thickness {
-            return (bracketed(r, end, view.excess, at_end, |x| look(x).excess), End::Surface);
+            let surface = bracketed(r, end, view.excess, at_end, |x| look(x).excess);
+            let there = look(surface);
+            // Another territory may have been entered, and left again beyond the surface, within the stride.
+            if there.lead < 0.0 {
+                let border = bracketed(r, surface, view.lead, there.lead, |x| look(x).lead);
+                return (border, End::Territory(there.rival));
+            }
+            return (surface, End::Surface);
         }
         if let Some(border) = border {
             return (border, End::Territory(ahead.rival));
