@@ -8,7 +8,7 @@ use super::substep::{Island, Work, advance};
 use crate::base::Motion;
 use crate::contact::candidate::Candidate;
 use crate::contact::deepest::{self, Approach};
-use crate::contact::pair::Pair;
+use crate::contact::pair::{Pair, Side};
 use crate::contact::stiffness::reachable;
 use crate::contact::surface::Settings;
 use crate::math::Vec3;
@@ -131,5 +131,12 @@ fn closing_speed(pair: &Pair, i: usize, j: usize, approach: &Approach, motions: 
     let acceleration = |motion: &Motion| if motion.is_movable() { motion.acceleration } else { Vec3::zeros() };
     let speed = (velocity(a) - velocity(b)).dot(&approach.direction);
     let gain = (acceleration(a) - acceleration(b)).dot(&approach.direction).max(0.0);
-    (speed + gain * dt).max(0.0)
+    // The other end of a turning body may swing in before the step is over.
+    let swing = |side: &Side, skeleton: usize, motion: &Motion| {
+        let (low, high) = side.skeletons[skeleton].shape.bounds(0.0);
+        let size = (high - low).norm();
+        let turning = motion.twist.angular.cross(&approach.direction).norm();
+        if size.is_finite() { turning * size } else { 0.0 }
+    };
+    (speed + gain * dt).max(0.0) + swing(&pair.a, i, a) + swing(&pair.b, j, b)
 }
