@@ -184,6 +184,8 @@ test-asan: $(C_TEST_BINS_ASAN)
 
 test-bullet: $(BULLET_BINS)
 	$(call run_each,$(BULLET_BINS),)
+	@CXX='$(CXX)' PKG_CONFIG='$(PKG_CONFIG)' STATIC_LIBS='$(STATIC_LIBS)' \
+		tests/cpp/precision_mismatch.sh '$(STATICLIB)' '$(WORK)/precision'
 
 test-examples: $(EXAMPLE_BINS)
 	$(call run_each,$(EXAMPLE_BINS),)
