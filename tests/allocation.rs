@@ -65,7 +65,7 @@ fn resting_scene(scheme: Scheme, round: bool) -> World {
     let rough = |coat: &Coat| BodyDesc {
         friction: 0.3,
         static_friction: 0.3,
-        dissipation: 0.5,
+        dissipation: 20.0,
         viscous_friction: 0.1,
         ..coat.body_desc()
     };

@@ -253,7 +253,7 @@ typedef uint32_t isocoat_scheme;
 
 /** The cheapest that meets the tolerance. */
 #define ISOCOAT_SCHEME_AUTO 0u
-/** Closed form; pairs without one take ISOCOAT_SCHEME_POLAR. */
+/** Closed form; pairs without one as ISOCOAT_SCHEME_AUTO. */
 #define ISOCOAT_SCHEME_CLOSED_FORM 1u
 /** A polar Gauss patch round the deepest point. */
 #define ISOCOAT_SCHEME_POLAR 2u

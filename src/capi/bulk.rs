@@ -10,7 +10,6 @@ use super::pointer::Array;
 use super::status::{Checked, Refusal, isocoat_status};
 use crate::error::Error;
 use crate::math::Wrench;
-use crate::world::desc::{validate_pose, validate_twist};
 use crate::world::{LinkId, LinkState, World};
 
 /// Sets the states of many links, as isocoat_link_set_state does: all of them, or none if one is refused.
@@ -36,9 +35,7 @@ pub unsafe extern "C" fn isocoat_world_set_link_states(
             for (index, (link, state)) in links.iter().zip(states.iter()).enumerate() {
                 let state = LinkState::from(state);
                 inner.world.link_state(link.into()).map_err(|error| Refusal::from(error).at("links", index))?;
-                validate_pose(&state.pose)
-                    .and_then(|()| validate_twist(&state.twist))
-                    .map_err(|error| Refusal::from(error).at("states", index))?;
+                state.validate().map_err(|error| Refusal::from(error).at("states", index))?;
             }
             for (link, state) in links.iter().zip(states.iter()) {
                 inner.world.set_link_state(link.into(), &state.into())?;

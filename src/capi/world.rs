@@ -26,7 +26,7 @@ pub const ISOCOAT_RESPONSE_SUBSTEPPED: isocoat_response = 3;
 pub type isocoat_scheme = u32;
 /// The cheapest that meets the tolerance.
 pub const ISOCOAT_SCHEME_AUTO: isocoat_scheme = 0;
-/// Closed form; pairs without one take ISOCOAT_SCHEME_POLAR.
+/// Closed form; pairs without one as ISOCOAT_SCHEME_AUTO.
 pub const ISOCOAT_SCHEME_CLOSED_FORM: isocoat_scheme = 1;
 /// A polar Gauss patch round the deepest point.
 pub const ISOCOAT_SCHEME_POLAR: isocoat_scheme = 2;

@@ -15,7 +15,7 @@ use crate::handle::RawId;
 use crate::math::{Quat, Vec3, rotation_to_vector};
 
 /// Motion of the nodes over the depth of the contact, over the root of the tolerance, up to which the surface is kept.
-const KEEP: f64 = 0.5;
+const KEEP: f64 = 0.1;
 
 /// Two bodies whose bounds meet.
 #[derive(Debug, Default)]
@@ -139,6 +139,12 @@ pub struct Memory {
 }
 
 impl Memory {
+    /// Forgets what the contact went through, but not that it is one.
+    pub fn forget_history(&mut self) {
+        self.rate2 = 0.0;
+        self.bristles.clear();
+    }
+
     /// Forgets all but the room for bristles.
     pub fn forget(&mut self) {
         let mut bristles = std::mem::take(&mut self.bristles);

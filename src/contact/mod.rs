@@ -25,7 +25,7 @@ pub enum Scheme {
     /// The cheapest that meets the tolerance.
     #[default]
     Auto,
-    /// Closed form; pairs without one take [`Scheme::Polar`].
+    /// Closed form; pairs without one as [`Scheme::Auto`].
     ClosedForm,
     /// Polar Gauss patch round the deepest point.
     Polar,

@@ -1,7 +1,7 @@
 //! Overload: loads past the most that a contact can carry.
 //!
-//! A coat's compression has an end. Two unequal balls carry less when pressed together beyond seven tenths of their
-//! overlap, a ball whose core reaches the surface of a hard body carries no more, and a ball wholly inside another
+//! A coat's compression has an end. Two unequal balls carry less when pressed together beyond a depth that goes with
+//! the ratio of their radii, a ball whose core reaches the surface of a hard body carries no more, and a ball wholly inside another
 //! feels no force at all (docs/model.md, "Overload"). The contact of two round coats of the same thicknesses tells
 //! where that is: exact for balls; shapes with faces count as half-spaces with an end to their core.
 

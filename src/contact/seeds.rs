@@ -9,7 +9,8 @@
 //! ```
 //!
 //! and a with the opposite, both at `X`; likewise with the roles exchanged. So action equals reaction at any number of
-//! seeds, and moving two bodies round a closed loop does no work.
+//! seeds, and moving two bodies round a closed loop does no work. A ray that only grazes the surface would get a
+//! boundless force: below a smallest cosine it counts as if it had that, and the loop closes to what such rays carry.
 
 use super::Scheme;
 use super::deepest::Deepest;

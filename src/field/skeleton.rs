@@ -132,7 +132,7 @@ impl Shape {
     /// A segment, or the point that a segment of no length is.
     pub fn segment(a: Vec3, b: Vec3) -> Self {
         let scale = a.norm().max(b.norm());
-        if (b - a).norm() <= 1e-12 * scale || a == b { Shape::Point(a) } else { Shape::Segment(a, b) }
+        if (b - a).norm() <= (1e-12 * scale).max(1e-150) { Shape::Point(a) } else { Shape::Segment(a, b) }
     }
 
     /// A triangle, or the segment or point that three collinear points span.

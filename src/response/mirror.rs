@@ -43,13 +43,12 @@ pub struct Host {
 }
 
 impl Mirror {
-    /// Sets the velocities of a motion that stands where the host is.
-    pub fn enter(&mut self, host: &Host, motion: &mut Motion, dt: f64) {
+    /// Sets the velocities of a motion that stands where the host is. True when the host was moved elsewhere.
+    pub fn enter(&mut self, host: &Host, motion: &mut Motion, dt: f64) -> bool {
         let jumped = (motion.center - self.expected_center).norm() > host.teleport
             || rotation_to_vector(&(motion.rotation * self.expected_rotation.inverse())).norm() > TELEPORT_ANGLE;
-        if self.active && jumped {
-            self.active = false;
-        }
+        let teleported = self.active && jumped;
+        self.active &= !jumped;
         motion.twist = if self.active {
             Twist {
                 linear: self.twist.linear + (host.twist.linear - self.expected_twist.linear),
@@ -66,6 +65,7 @@ impl Mirror {
                 angular: host.twist.angular + motion.angular_acceleration * age,
             }
         };
+        teleported
     }
 
     /// Takes the motion at the end of the tick, which began at `center`, `rotation`, and gives the impulse for the

@@ -84,6 +84,14 @@ pub struct LinkState {
     pub twist: Twist,
 }
 
+impl LinkState {
+    /// Checks that all figures are finite and the rotation is one.
+    pub fn validate(&self) -> Result<()> {
+        desc::validate_pose(&self.pose)?;
+        desc::validate_twist(&self.twist)
+    }
+}
+
 /// Receives the library's messages; the text is valid during the call.
 pub type Log = Box<dyn FnMut(LogLevel, &str) + Send>;
 /// Says whether two bodies may touch; called once a step for each pair whose bounds meet.
@@ -403,8 +411,7 @@ impl World {
     /// Sets pose and twist of a link: every tick for a host-driven one. What differs from what the last impulse
     /// commanded counts as the host's own push; a jump of more than half the thinnest coat counts as a teleport.
     pub fn set_link_state(&mut self, id: LinkId, state: &LinkState) -> Result<()> {
-        desc::validate_pose(&state.pose)?;
-        desc::validate_twist(&state.twist)?;
+        state.validate()?;
         let link = self.links.get_mut(id)?;
         link.desc.pose = state.pose;
         link.desc.pose.rotation.renormalize();
@@ -415,7 +422,9 @@ impl World {
     /// Sets pose and twist of a link and forgets its contact history.
     pub fn teleport_link(&mut self, id: LinkId, state: &LinkState) -> Result<()> {
         self.set_link_state(id, state)?;
-        self.links.get_mut(id)?.mirror = Mirror::default();
+        let link = self.links.get_mut(id)?;
+        link.mirror = Mirror::default();
+        self.stepping.forget_contacts_of(link.body);
         Ok(())
     }
 

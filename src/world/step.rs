@@ -48,6 +48,13 @@ impl Stepping {
     pub fn counters(&self) -> Counters {
         self.counters
     }
+
+    /// What the contacts of a body went through no longer counts: it was put elsewhere.
+    pub fn forget_contacts_of(&mut self, body: u32) {
+        for candidate in self.candidates.iter_mut().filter(|candidate| candidate.bodies.contains(&body)) {
+            candidate.memory.forget_history();
+        }
+    }
 }
 
 impl World {
@@ -81,7 +88,10 @@ impl World {
             let teleport = if mirrored { 0.5 * self.thinnest(&self.links[index]) } else { 0.0 };
             let link = &mut self.links[index];
             if mirrored {
-                link.mirror.enter(&host(link, teleport), &mut motion, dt);
+                if link.mirror.enter(&host(link, teleport), &mut motion, dt) {
+                    let body = link.body;
+                    state.forget_contacts_of(body);
+                }
             } else if motion.is_movable() && link.desc.kind != Kind::Host {
                 let pushed = motion.answer(&link.applied_impulse);
                 motion.twist.linear += pushed.linear;

@@ -189,6 +189,7 @@ int main() {
         load("on Bullet's floor", ticks, 1e5, 1);
         load("on Bullet's floor", ticks, 1e4, 5);
     }
+    planar(1);
     planar(4);
     mixed_pile();
     jointed();
