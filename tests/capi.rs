@@ -143,7 +143,8 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
         motion::isocoat_link_state { pose, linear_velocity, angular_velocity }
         buffer::isocoat_buffer { data, stride, format }
         world::isocoat_world_desc {
-            struct_size, response, scheme, seed_count, max_substeps, gravity, force_tolerance, substep_phase,
+            struct_size, response, scheme, seed_count, max_substeps, gravity, force_tolerance, substep_phase, implicit_tolerance,
+            implicit_rounds, implicit_splits,
         }
         body::isocoat_body_desc {
             struct_size, kind, isovalue, stiffness_scale, friction, static_friction, viscous_friction, dissipation,

@@ -8,7 +8,7 @@ use super::descriptor::{self, Descriptor, OutStruct};
 use super::guard::{self, free, isocoat_world, outside, read, write};
 use super::handle::isocoat_body;
 use super::pointer::Out;
-use super::status::{Checked, ISOCOAT_ERROR_UNSUPPORTED, Refusal, isocoat_status};
+use super::status::{Checked, Refusal, isocoat_status};
 use crate::world::{BodyId, LogLevel, Response, Scheme, World, WorldDesc};
 
 /// How contact forces act on the links in time: an ISOCOAT_RESPONSE_ value.
@@ -17,7 +17,8 @@ pub type isocoat_response = u32;
 pub const ISOCOAT_RESPONSE_AUTO: isocoat_response = 0;
 /// One evaluation of the forces a step, at its beginning: for small steps only.
 pub const ISOCOAT_RESPONSE_EXPLICIT: isocoat_response = 1;
-/// One implicit solve a step. Not in this version: gives ISOCOAT_ERROR_UNSUPPORTED.
+/// Velocities and forces of all links in contact that agree at the end of the step: stable at any stiffness and mass,
+/// exact at rest; contacts do not bounce.
 pub const ISOCOAT_RESPONSE_IMPLICIT: isocoat_response = 2;
 /// Many small steps inside each step; host-driven links through a mirror that lasts from step to step.
 pub const ISOCOAT_RESPONSE_SUBSTEPPED: isocoat_response = 3;
@@ -62,6 +63,13 @@ pub struct isocoat_world_desc {
     pub force_tolerance: f64,
     /// Largest product of contact frequency and sub-step, in rad: from 0.01 to 1. Default 0.2.
     pub substep_phase: f64,
+    /// Implicit response: motion of a contact between two rounds, over its depth, that ends them: from 1e-9 to 1.
+    /// Default 0.05.
+    pub implicit_tolerance: f64,
+    /// Implicit response: most evaluations of a contact surface before the step is split: from 1 to 64. Default 8.
+    pub implicit_rounds: u32,
+    /// Implicit response: how often a step that does not converge may be split in two: from 0 to 10. Default 4.
+    pub implicit_splits: u32,
 }
 
 // SAFETY: `repr(C)`, the size first, integers and doubles only.
@@ -81,6 +89,7 @@ impl From<&WorldDesc> for isocoat_world_desc {
             response: match desc.response {
                 Response::Auto => ISOCOAT_RESPONSE_AUTO,
                 Response::Explicit => ISOCOAT_RESPONSE_EXPLICIT,
+                Response::Implicit => ISOCOAT_RESPONSE_IMPLICIT,
                 Response::Substepped => ISOCOAT_RESPONSE_SUBSTEPPED,
             },
             scheme: scheme_to_c(desc.scheme),
@@ -89,6 +98,9 @@ impl From<&WorldDesc> for isocoat_world_desc {
             gravity: desc.gravity.into(),
             force_tolerance: desc.force_tolerance,
             substep_phase: desc.substep_phase,
+            implicit_tolerance: desc.implicit_tolerance,
+            implicit_rounds: desc.implicit_rounds,
+            implicit_splits: desc.implicit_splits,
         }
     }
 }
@@ -99,11 +111,7 @@ impl isocoat_world_desc {
             ISOCOAT_RESPONSE_AUTO => Response::Auto,
             ISOCOAT_RESPONSE_EXPLICIT => Response::Explicit,
             ISOCOAT_RESPONSE_SUBSTEPPED => Response::Substepped,
-            ISOCOAT_RESPONSE_IMPLICIT => {
-                let message = "response is ISOCOAT_RESPONSE_IMPLICIT (2), which this version lacks; take \
-                               ISOCOAT_RESPONSE_SUBSTEPPED (3)";
-                return Err(Refusal::new(ISOCOAT_ERROR_UNSUPPORTED, message));
-            }
+            ISOCOAT_RESPONSE_IMPLICIT => Response::Implicit,
             other => return Err(unknown("response", other, "ISOCOAT_RESPONSE_", 3)),
         };
         Ok(WorldDesc {
@@ -114,6 +122,9 @@ impl isocoat_world_desc {
             seed_count: self.seed_count,
             max_substeps: self.max_substeps,
             substep_phase: self.substep_phase,
+            implicit_tolerance: self.implicit_tolerance,
+            implicit_rounds: self.implicit_rounds,
+            implicit_splits: self.implicit_splits,
         })
     }
 }

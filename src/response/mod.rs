@@ -1,6 +1,9 @@
 //! Response: how contact forces move links.
 
+pub mod coupled;
+pub mod envelope;
 pub mod explicit;
+pub mod implicit;
 pub mod mirror;
 pub mod substep;
 pub mod substepped;
@@ -13,6 +16,8 @@ pub enum Response {
     Auto,
     /// One force evaluation a step, at the pose of its beginning.
     Explicit,
+    /// Velocities and forces that agree at the end of the step: stable at any stiffness, and never bouncing.
+    Implicit,
     /// Many small steps inside each step; host-driven links through a persistent mirror.
     Substepped,
 }

@@ -63,7 +63,7 @@ pub fn advance(
     drift(motions, island, (1.0 - before) * h);
 }
 
-fn drift(motions: &mut [Motion], island: &Island, h: f64) {
+pub(super) fn drift(motions: &mut [Motion], island: &Island, h: f64) {
     if h > 0.0 {
         for link in &island.links {
             motions[*link as usize].drift(h);
@@ -76,7 +76,7 @@ fn key(pair: &Pair, patch: &patch::Patch) -> [u32; 2] {
     [pair.a.ids[patch.skeletons[0]], pair.b.ids[patch.skeletons[1]]]
 }
 
-fn bend_bristles(candidate: &mut Candidate, motions: &[Motion], h: f64, carriers: &mut Carriers) {
+pub(super) fn bend_bristles(candidate: &mut Candidate, motions: &[Motion], h: f64, carriers: &mut Carriers) {
     let Candidate { pair, surface, nodes, memory, .. } = candidate;
     for bristle in &mut memory.bristles {
         bristle.seen = false;

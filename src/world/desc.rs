@@ -32,6 +32,12 @@ pub struct WorldDesc {
     pub max_substeps: u32,
     /// Largest product of contact frequency and sub-step \[rad\], from 0.01 to 1.
     pub substep_phase: f64,
+    /// Implicit response: most evaluations of a contact surface before the step is split, from 1 to 64.
+    pub implicit_rounds: u32,
+    /// Implicit response: how often a step that does not converge may be split in two, from 0 to 10.
+    pub implicit_splits: u32,
+    /// Implicit response: motion of a contact between two rounds, over its depth, that ends them, from 1e-9 to 1.
+    pub implicit_tolerance: f64,
 }
 
 impl Default for WorldDesc {
@@ -44,6 +50,9 @@ impl Default for WorldDesc {
             seed_count: 64,
             max_substeps: 4096,
             substep_phase: 0.2,
+            implicit_rounds: 8,
+            implicit_splits: 4,
+            implicit_tolerance: 0.05,
         }
     }
 }
@@ -54,7 +63,10 @@ impl WorldDesc {
         require("force_tolerance", self.force_tolerance, "from 1e-9 to 0.5", |x| (1e-9..=0.5).contains(&x))?;
         validate_seed_count(self.seed_count)?;
         require("max_substeps", self.max_substeps.into(), "from 1 to 65536", |x| (1.0..=65536.0).contains(&x))?;
-        require("substep_phase", self.substep_phase, "from 0.01 to 1", |x| (0.01..=1.0).contains(&x))
+        require("substep_phase", self.substep_phase, "from 0.01 to 1", |x| (0.01..=1.0).contains(&x))?;
+        require("implicit_rounds", self.implicit_rounds.into(), "from 1 to 64", |x| (1.0..=64.0).contains(&x))?;
+        require("implicit_splits", self.implicit_splits.into(), "from 0 to 10", |x| (0.0..=10.0).contains(&x))?;
+        require("implicit_tolerance", self.implicit_tolerance, "from 1e-9 to 1", |x| (1e-9..=1.0).contains(&x))
     }
 }
 

@@ -10,7 +10,7 @@ use crate::error::{Result, require};
 use crate::math::Wrench;
 use crate::response::mirror::Host;
 use crate::response::substep::{Island, Work};
-use crate::response::{Response, explicit, substepped};
+use crate::response::{Response, explicit, implicit, substepped};
 
 /// What the pipeline keeps between steps, and its buffers.
 #[derive(Default)]
@@ -31,6 +31,7 @@ pub(crate) struct Stepping {
     island_of: Vec<u32>,
     rates: Vec<f64>,
     work: Work,
+    implicit: implicit::Solver,
     contacts: Vec<Contact>,
     events: Vec<Event>,
     counters: Counters,
@@ -106,7 +107,8 @@ impl World {
     }
 
     fn is_mirrored(&self, link: &Link, motion: &Motion) -> bool {
-        link.desc.kind == Kind::Host && motion.is_movable() && self.desc.response != Response::Explicit
+        link.desc.kind == Kind::Host && motion.is_movable() 
+            && matches!(self.desc.response, Response::Auto | Response::Substepped)
     }
 
     /// Pairs of bodies whose bounds meet and that may touch.
@@ -262,19 +264,33 @@ impl World {
     fn respond(&mut self, state: &mut Stepping, dt: f64) {
         let settings = surface::Settings { scheme: self.desc.scheme, tolerance: self.desc.force_tolerance };
         let limits = substepped::Limits { phase: self.desc.substep_phase, most: self.desc.max_substeps };
+        let effort = implicit::Effort {
+            rounds: self.desc.implicit_rounds,
+            tolerance: self.desc.implicit_tolerance,
+            splits: self.desc.implicit_splits,
+        };
         state.work.evaluations = 0;
         let mut most = 0;
         let mut short = 0.0f64;
         for island in &state.islands[..state.island_count] {
             let (motions, candidates, work) = (&mut state.motions, &mut state.candidates, &mut state.work);
-            if self.desc.response == Response::Explicit {
-                explicit::step(motions, island, candidates, dt, &settings, work);
-                most = most.max(1);
-            } else {
-                let taken =
-                    substepped::step(motions, island, candidates, dt, &settings, &limits, &mut state.rates, work);
-                most = most.max(taken.substeps);
-                short = short.max(taken.wanted / f64::from(taken.substeps));
+            match self.desc.response {
+                Response::Explicit => {
+                    explicit::step(motions, island, candidates, dt, &settings, work);
+                    most = most.max(1);
+                }
+                Response::Implicit => {
+                    let solver = &mut state.implicit;
+                    implicit::step(motions, island, candidates, dt, &settings, &effort, solver, work);
+                    most = most.max(solver.rounds);
+                }
+                Response::Auto | Response::Substepped => {
+                    let rates = &mut state.rates;
+                    let taken =
+                        substepped::step(motions, island, candidates, dt, &settings, &limits, rates, work);
+                    most = most.max(taken.substeps);
+                    short = short.max(taken.wanted / f64::from(taken.substeps));
+                }
             }
             // Kinematic links start every island from the host's pose.
             for link in &island.links {

@@ -25,7 +25,6 @@ static void worlds(void)
     isocoat_world *world = new_world();
 
     WORLD(response, 4, argument, "response is 4; must be one of ISOCOAT_RESPONSE_*, 0 to 3");
-    WORLD(response, ISOCOAT_RESPONSE_IMPLICIT, unsupported, "ISOCOAT_RESPONSE_IMPLICIT");
     WORLD(scheme, 5, argument, "scheme is 5; must be one of ISOCOAT_SCHEME_*, 0 to 4");
     WORLD(seed_count, 3, range, "seed_count is 3; must be from 4 to 65536");
     WORLD(seed_count, 65537, range, "seed_count is 65537");
@@ -38,6 +37,9 @@ static void worlds(void)
     WORLD(force_tolerance, NAN, range, "force_tolerance is NaN");
     WORLD(substep_phase, 0.001, range, "substep_phase is 0.001; must be from 0.01 to 1");
     WORLD(substep_phase, 1.5, range, "substep_phase is 1.5");
+    WORLD(implicit_tolerance, 0, range, "implicit_tolerance is 0; must be from 1e-9 to 1");
+    WORLD(implicit_rounds, 0, range, "implicit_rounds is 0; must be from 1 to 64");
+    WORLD(implicit_splits, 11, range, "implicit_splits is 11; must be from 0 to 10");
 
     REFUSED(isocoat_world_step(world, 0.0), range, "dt is 0; must be > 0 and at most 10 s");
     REFUSED(isocoat_world_step(world, -0.01), range, "dt is -0.01");

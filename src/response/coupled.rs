@@ -1,0 +1,421 @@
+//! The contacts of an island at one pose, linear in the velocities, and the velocities that satisfy them all at once:
+//! the inner problem of the [implicit response](super::implicit).
+//!
+//! At a point of a contact surface with pressure `p`, stiffness an area `g` and normal `n` (from a to b), the pressure
+//! at the end of the step is `[p - h g n·(u - u_k)]₊` for the relative velocity `u` of b, when the surface was evaluated
+//! at the pose that `u_k` leads to. Friction and dissipation act with that pressure. What is sought is
+//! `M (v - v*) = h Σ forces`, by Newton's method on a system that stays symmetric and positive definite.
+
+use nalgebra::{Matrix6, Vector6};
+
+use super::envelope::{BLOCK, Envelope};
+use crate::base::{Inertia, Motion};
+use crate::contact::press::Material;
+use crate::math::{Mat3, Quat, Twist, Vec3, Wrench, rotate_tensor};
+
+/// A point of a contact.
+#[derive(Clone, Copy, Debug)]
+pub struct Point {
+    /// Where, from the group's centre \[m\].
+    pub arm: Vec3,
+    /// From a to b.
+    pub normal: Vec3,
+    /// Force along the normal at the pose of the evaluation; negative where there is a gap yet \[N\].
+    pub load: f64,
+    /// Its change a metre of approach \[N/m\].
+    pub stiffness: f64,
+    /// Its area \[m²\].
+    pub area: f64,
+}
+
+/// A link that carries a group of points.
+#[derive(Clone, Copy, Debug)]
+pub struct Member {
+    /// Slot of the link.
+    pub link: u32,
+    /// Its part of the points' velocity: positive on b, negative on a.
+    pub weight: f64,
+    /// The group's centre from the link's centre of mass \[m\].
+    pub arm: Vec3,
+    /// The link can turn; a point mass cannot.
+    pub turns: bool,
+}
+
+impl Member {
+    /// Velocity of the link's material about the group's centre.
+    fn twist(&self, of_link: &Twist) -> Twist {
+        if self.turns {
+            Twist { linear: of_link.at(&self.arm), angular: of_link.angular }
+        } else {
+            Twist { linear: of_link.linear, angular: Vec3::zeros() }
+        }
+    }
+
+    /// The same as a matrix.
+    fn map(&self) -> Matrix6<f64> {
+        let mut matrix = Matrix6::identity();
+        if self.turns {
+            matrix.fixed_view_mut::<3, 3>(0, 3).copy_from(&-self.arm.cross_matrix());
+        } else {
+            matrix.fixed_view_mut::<3, 3>(3, 3).fill(0.0);
+        }
+        matrix
+    }
+}
+
+/// Dry friction of a group.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Grip {
+    /// Friction force over normal force.
+    pub coefficient: f64,
+    /// Slip velocity up to which the force grows \[m/s\].
+    pub creep: f64,
+    /// Slip that it wants at the centre: what takes back the bend of a bristle \[m/s\].
+    pub slip: Vec3,
+    /// Turn about the mean normal that it wants \[rad/s\].
+    pub spin: Vec3,
+    /// Lever of its torsional friction, for a patch that is one point \[m\].
+    pub radius: f64,
+}
+
+/// Points that the same links carry, in the same parts.
+#[derive(Clone, Copy, Debug)]
+pub struct Group {
+    /// Which candidate it belongs to.
+    pub candidate: u32,
+    /// Which of its patches; none for a gap that may close.
+    pub patch: Option<u32>,
+    /// Centre of the group, in the pair's frame.
+    pub center: Vec3,
+    /// First and last-plus-one of its points.
+    pub points: (usize, usize),
+    /// First and last-plus-one of its members.
+    pub members: (usize, usize),
+    /// How it damps.
+    pub material: Material,
+    /// How it rubs.
+    pub grip: Grip,
+    /// Relative velocity at the evaluation.
+    pub base: Twist,
+}
+
+/// What a group's points come to at some velocity.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Push {
+    /// Force and torque on b about the centre, all told.
+    pub all: Wrench,
+    /// The same without dry friction.
+    pub pressing: Wrench,
+}
+
+/// The contacts of an island at one pose.
+#[derive(Debug, Default)]
+pub struct Coupled {
+    /// All groups.
+    pub groups: Vec<Group>,
+    /// Points of all groups.
+    pub points: Vec<Point>,
+    /// Members of all groups.
+    pub members: Vec<Member>,
+    masses: Vec<Matrix6<f64>>,
+    mobilities: Vec<Matrix6<f64>>,
+    blocks: Vec<u32>,
+    first: Vec<u32>,
+    matrix: Envelope,
+    residual: Vec<f64>,
+    base: Vec<f64>,
+    step: Vec<f64>,
+    /// Newton steps taken.
+    pub newton_steps: u64,
+}
+
+/// Slot without unknowns.
+const NONE: u32 = u32::MAX;
+
+impl Coupled {
+    /// Sets the links with unknowns, in the order of the system, with their inertia at the start of the step.
+    pub fn set_links(&mut self, links: &[u32], motions: &[Motion]) {
+        self.masses.clear();
+        self.mobilities.clear();
+        self.blocks.clear();
+        self.blocks.resize(motions.len(), NONE);
+        for (block, link) in links.iter().enumerate() {
+            self.blocks[*link as usize] = block as u32;
+            let (mass, mobility) = inertia(&motions[*link as usize]);
+            self.masses.push(mass);
+            self.mobilities.push(mobility);
+        }
+    }
+
+    /// Forgets the groups.
+    pub fn clear(&mut self) {
+        self.groups.clear();
+        self.points.clear();
+        self.members.clear();
+    }
+
+    /// Velocity of b's flesh relative to a's over a group, about its centre, for velocities `of` the links.
+    pub fn relative(&self, group: &Group, of: impl Fn(u32) -> Twist) -> Twist {
+        let mut sum = Twist::default();
+        for member in &self.members[group.members.0..group.members.1] {
+            let twist = member.twist(&of(member.link));
+            sum.linear += twist.linear * member.weight;
+            sum.angular += twist.angular * member.weight;
+        }
+        sum
+    }
+
+    /// The relative velocity of a group for the unknowns `x`; `fixed` has the velocities of links without unknowns.
+    pub fn relative_of(&self, group: &Group, x: &[f64], fixed: &[Motion]) -> Twist {
+        self.relative(group, |link| match self.blocks[link as usize] {
+            NONE => fixed[link as usize].twist,
+            block => twist_of(x, block),
+        })
+    }
+
+    /// What a group comes to at the unknowns `x`.
+    pub fn push(&self, group: &Group, x: &[f64], fixed: &[Motion], h: f64) -> Push {
+        self.respond(group, &self.relative_of(group, x, fixed), h, None)
+    }
+
+    /// Solves for the velocities at the end of the step, in place; `free` has those without contact, `fixed` those of
+    /// the links without unknowns. False when Newton's method gives up.
+    pub fn solve(&mut self, x: &mut [f64], free: &[f64], fixed: &[Motion], h: f64) -> bool {
+        self.shape(x.len() / BLOCK);
+        let (mut last, mut scale, mut part) = (f64::INFINITY, 0.0, 1.0);
+        self.base.clear();
+        self.base.extend_from_slice(x);
+        self.step.clear();
+        self.step.resize(x.len(), 0.0);
+        for round in 0..60 {
+            self.assemble(x, free, fixed, h);
+            let norm = self.norm(&self.residual);
+            if round == 0 {
+                scale = norm + self.energy(x) + self.energy(free);
+            }
+            // Sums of contact forces round off at this.
+            if norm <= 1e-26 * scale || norm == 0.0 {
+                return true;
+            }
+            if norm > last * (1.0 + 1e-9) && part > 1e-3 {
+                part *= 0.5;
+                for (x, (base, step)) in x.iter_mut().zip(self.base.iter().zip(&self.step)) {
+                    *x = base - part * step;
+                }
+                continue;
+            }
+            let settled = norm > 0.99 * last && norm <= 1e-16 * scale;
+            if settled {
+                return true;
+            }
+            (last, part) = (norm, 1.0);
+            self.newton_steps += 1;
+            self.step.copy_from_slice(&self.residual);
+            if !self.matrix.factor() {
+                return false;
+            }
+            self.matrix.solve(&mut self.step);
+            self.base.copy_from_slice(x);
+            for (x, step) in x.iter_mut().zip(&self.step) {
+                *x -= step;
+            }
+        }
+        last <= 1e-10 * scale
+    }
+
+    /// Square of a residual's size: the kinetic energy of the velocities that it stands for, twice.
+    fn norm(&self, residual: &[f64]) -> f64 {
+        let size = |(part, mobility): (&[f64], &Matrix6<f64>)| {
+            let part = Vector6::from_column_slice(part);
+            part.dot(&(mobility * part))
+        };
+        residual.chunks_exact(BLOCK).zip(&self.mobilities).map(size).sum()
+    }
+
+    /// Twice the kinetic energy of velocities.
+    fn energy(&self, x: &[f64]) -> f64 {
+        let size = |(part, mass): (&[f64], &Matrix6<f64>)| {
+            let part = Vector6::from_column_slice(part);
+            part.dot(&(mass * part))
+        };
+        x.chunks_exact(BLOCK).zip(&self.masses).map(size).sum()
+    }
+
+    /// The envelope that the groups need.
+    fn shape(&mut self, count: usize) {
+        self.first.clear();
+        self.first.extend(0..count as u32);
+        for group in &self.groups {
+            let blocks = || {
+                let members = self.members[group.members.0..group.members.1].iter();
+                members.map(|member| self.blocks[member.link as usize]).filter(|block| *block != NONE)
+            };
+            let Some(lowest) = blocks().min() else { continue };
+            for block in blocks() {
+                let first = &mut self.first[block as usize];
+                *first = lowest.min(*first);
+            }
+        }
+        self.matrix.reset(&self.first);
+    }
+
+    /// Residual `M (x - free) - h Σ forces` and its derivative.
+    fn assemble(&mut self, x: &[f64], free: &[f64], fixed: &[Motion], h: f64) {
+        self.matrix.zero();
+        self.residual.clear();
+        for (block, mass) in self.masses.iter().enumerate() {
+            let range = block * BLOCK..(block + 1) * BLOCK;
+            let change =
+                Vector6::from_column_slice(&x[range.clone()]) - Vector6::from_column_slice(&free[range.clone()]);
+            self.residual.extend_from_slice((mass * change).as_slice());
+            self.matrix.add(block, block, mass);
+        }
+        for index in 0..self.groups.len() {
+            let group = self.groups[index];
+            let relative = self.relative_of(&group, x, fixed);
+            let mut slope = Matrix6::zeros();
+            let push = self.respond(&group, &relative, h, Some(&mut slope));
+            if slope == Matrix6::zeros() {
+                continue;
+            }
+            let members = &self.members[group.members.0..group.members.1];
+            for (row, member) in members.iter().enumerate() {
+                let i = self.blocks[member.link as usize];
+                if i == NONE {
+                    continue;
+                }
+                let back = member.map().transpose() * member.weight;
+                let (force, torque) = (&push.all.force, &push.all.torque);
+                let part = back * Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z);
+                for (residual, part) in self.residual[i as usize * BLOCK..].iter_mut().zip(part.iter()) {
+                    *residual -= h * part;
+                }
+                let shifted = back * slope;
+                for other in &members[..=row] {
+                    let j = self.blocks[other.link as usize];
+                    if j == NONE {
+                        continue;
+                    }
+                    let block = shifted * other.map() * other.weight;
+                    if i > j || i == j && other.link == member.link {
+                        self.matrix.add(i as usize, j as usize, &block);
+                    } else {
+                        self.matrix.add(j as usize, i as usize, &block.transpose());
+                    }
+                }
+            }
+        }
+    }
+
+    /// Force and torque of a group on b at a relative velocity; to `slope` it adds minus `h` times their derivative by
+    /// that velocity, without the part that would make it lopsided.
+    fn respond(&self, group: &Group, relative: &Twist, h: f64, mut slope: Option<&mut Matrix6<f64>>) -> Push {
+        let Material { dissipation, viscous, .. } = group.material;
+        let grip = &group.grip;
+        let since = Twist {
+            linear: relative.linear - group.base.linear,
+            angular: relative.angular - group.base.angular,
+        };
+        let (mut normal_load, mut mean_normal) = (0.0, Vec3::zeros());
+        let mut push = Push::default();
+        // Everything about the centre; the slope as blocks.
+        let (mut ll, mut la, mut aa) = (Mat3::zeros(), Mat3::zeros(), Mat3::zeros());
+        for point in &self.points[group.points.0..group.points.1] {
+            let pressing = point.load - h * point.stiffness * point.normal.dot(&since.at(&point.arm));
+            if pressing <= 0.0 {
+                continue;
+            }
+            let velocity = relative.at(&point.arm);
+            let parting = point.normal.dot(&velocity);
+            let damping = (1.0 - dissipation * parting).max(0.0);
+            let drag = viscous * point.area;
+            let load = (pressing * damping - drag * parting).max(0.0);
+            let mut force = point.normal * load - (velocity - point.normal * parting) * drag;
+            push.pressing.add_force_at(&force, &point.arm);
+            let stiff = if load > 0.0 {
+                let damped = if damping > 0.0 { pressing * dissipation } else { 0.0 };
+                h * point.stiffness * damping + damped + drag
+            } else {
+                0.0
+            };
+            let mut matrix = point.normal * point.normal.transpose() * (stiff - drag);
+            matrix += Mat3::identity() * drag;
+            if grip.coefficient > 0.0 && load > 0.0 {
+                normal_load += load;
+                mean_normal += point.normal * load;
+                let wanted = grip.slip + grip.spin.cross(&point.arm);
+                let slip = velocity - wanted;
+                let slip = slip - point.normal * slip.dot(&point.normal);
+                let speed = slip.norm().hypot(grip.creep);
+                let most = grip.coefficient * load;
+                force -= slip * (most / speed);
+                let plane = Mat3::identity() - point.normal * point.normal.transpose();
+                matrix += (plane - slip * slip.transpose() / (speed * speed)) * (most / speed);
+            }
+            push.all.add_force_at(&force, &point.arm);
+            if slope.is_some() {
+                // d(force)/d(linear, angular) = matrix (I, -[arm]), and the torque is [arm] times the force.
+                let cross = point.arm.cross_matrix();
+                ll += matrix;
+                la -= matrix * cross;
+                aa -= cross * matrix * cross;
+            }
+        }
+        if grip.radius > 0.0 && normal_load > 0.0 && mean_normal != Vec3::zeros() {
+            let axis = mean_normal.normalize();
+            let spin = (relative.angular - grip.spin).dot(&axis);
+            let creep = grip.creep / grip.radius;
+            let rate = spin.hypot(creep);
+            let most = grip.coefficient * normal_load * grip.radius;
+            push.all.torque -= axis * (most * spin / rate);
+            aa += axis * axis.transpose() * (most * creep * creep / (rate * rate * rate));
+        }
+        if let Some(slope) = &mut slope {
+            slope.fixed_view_mut::<3, 3>(0, 0).copy_from(&(ll * h));
+            slope.fixed_view_mut::<3, 3>(0, 3).copy_from(&(la * h));
+            slope.fixed_view_mut::<3, 3>(3, 0).copy_from(&(la.transpose() * h));
+            slope.fixed_view_mut::<3, 3>(3, 3).copy_from(&(aa * h));
+        }
+        push
+    }
+}
+
+/// The twist of a block of unknowns.
+pub fn twist_of(x: &[f64], block: u32) -> Twist {
+    let at = &x[block as usize * BLOCK..];
+    Twist { linear: Vec3::new(at[0], at[1], at[2]), angular: Vec3::new(at[3], at[4], at[5]) }
+}
+
+/// Writes a twist into a block of unknowns.
+pub fn put_twist(x: &mut [f64], block: u32, twist: &Twist) {
+    let at = &mut x[block as usize * BLOCK..][..BLOCK];
+    at[..3].copy_from_slice(twist.linear.as_slice());
+    at[3..].copy_from_slice(twist.angular.as_slice());
+}
+
+/// Inertia of a link as a matrix, and its inverse. A point mass does not turn: the block for it stands by itself.
+fn inertia(motion: &Motion) -> (Matrix6<f64>, Matrix6<f64>) {
+    let diagonal = |mass: f64, tensor: &Mat3| {
+        let mut matrix = Matrix6::identity() * mass;
+        matrix.fixed_view_mut::<3, 3>(3, 3).copy_from(tensor);
+        matrix
+    };
+    match &motion.inertia {
+        Inertia::Immovable => (Matrix6::identity(), Matrix6::identity()),
+        Inertia::Point { inverse_mass } => {
+            let mass = 1.0 / inverse_mass;
+            (diagonal(mass, &(Mat3::identity() * mass)), diagonal(*inverse_mass, &(Mat3::identity() * *inverse_mass)))
+        }
+        Inertia::Solid { inverse_mass, local, inverse_local, .. } => {
+            let turned = |tensor: &Mat3, rotation: &Quat| rotate_tensor(rotation, tensor);
+            (
+                diagonal(1.0 / inverse_mass, &turned(local, &motion.rotation)),
+                diagonal(*inverse_mass, &turned(inverse_local, &motion.rotation)),
+            )
+        }
+        Inertia::Effective(mobility) => {
+            let mass = mobility.cholesky().map_or_else(Matrix6::identity, |factor| factor.inverse());
+            (mass, *mobility)
+        }
+    }
+}
