@@ -129,6 +129,18 @@ pub struct Coupled {
     pub newton_steps: u64,
 }
 
+/// Steps of Newton's method in one solve.
+const MOST_STEPS: usize = 60;
+
+/// Looks along one step for its lowest point.
+const MOST_LOOKS: usize = 12;
+
+/// Slope along a step, over the slope at its start, that counts as lowest.
+const FLAT: f64 = 0.2;
+
+/// Residual over the kinetic energy at work, both squared, that counts as solved.
+const SOLVED: f64 = 1e-24;
+
 /// Slot without unknowns.
 const NONE: u32 = u32::MAX;
 
@@ -179,48 +191,72 @@ impl Coupled {
     }
 
     /// Solves for the velocities at the end of the step, in place; `free` has those without contact, `fixed` those of
-    /// the links without unknowns. False when Newton's method gives up.
+    /// the links without unknowns. False when it does not get there.
+    ///
+    /// But for the pressure's part in friction, the residual is the gradient of a convex function. Newton's method
+    /// overshoots its lowest point where a slip comes to rest, so each step goes to the lowest point along it.
     pub fn solve(&mut self, x: &mut [f64], free: &[f64], fixed: &[Motion], h: f64) -> bool {
         self.shape(x.len() / BLOCK);
-        let (mut last, mut scale, mut part) = (f64::INFINITY, 0.0, 1.0);
-        self.base.clear();
-        self.base.extend_from_slice(x);
-        self.step.clear();
-        self.step.resize(x.len(), 0.0);
-        for round in 0..60 {
-            self.assemble(x, free, fixed, h);
-            let norm = self.norm(&self.residual);
-            if round == 0 {
-                scale = norm + self.energy(x) + self.energy(free);
-            }
-            // Sums of contact forces round off at this.
-            if norm <= 1e-26 * scale || norm == 0.0 {
+        self.assemble(x, free, fixed, h, true);
+        let mut norm = self.norm(&self.residual);
+        let scale = norm + self.energy(x) + self.energy(free);
+        for _ in 0..MOST_STEPS {
+            if norm <= SOLVED * scale {
                 return true;
             }
-            if norm > last * (1.0 + 1e-9) && part > 1e-3 {
-                part *= 0.5;
-                for (x, (base, step)) in x.iter_mut().zip(self.base.iter().zip(&self.step)) {
-                    *x = base - part * step;
-                }
-                continue;
-            }
-            let settled = norm > 0.99 * last && norm <= 1e-16 * scale;
-            if settled {
-                return true;
-            }
-            (last, part) = (norm, 1.0);
             self.newton_steps += 1;
-            self.step.copy_from_slice(&self.residual);
+            self.step.clone_from(&self.residual);
             if !self.matrix.factor() {
                 return false;
             }
             self.matrix.solve(&mut self.step);
-            self.base.copy_from_slice(x);
-            for (x, step) in x.iter_mut().zip(&self.step) {
-                *x -= step;
+            self.base.clear();
+            self.base.extend_from_slice(x);
+            let part = self.lowest_along(x, free, fixed, h);
+            self.put_step(x, part);
+            let last = norm;
+            self.assemble(x, free, fixed, h, true);
+            norm = self.norm(&self.residual);
+            // Sums of contact forces round off.
+            if norm > 0.9 * last && norm <= 1e-16 * scale {
+                return true;
             }
         }
-        last <= 1e-10 * scale
+        norm <= 1e-10 * scale
+    }
+
+    fn put_step(&self, x: &mut [f64], part: f64) {
+        for (x, (base, step)) in x.iter_mut().zip(self.base.iter().zip(&self.step)) {
+            *x = base - part * step;
+        }
+    }
+
+    /// How much of the step to take: where the slope along it has fallen to a small part.
+    fn lowest_along(&mut self, x: &mut [f64], free: &[f64], fixed: &[Motion], h: f64) -> f64 {
+        let along = |residual: &[f64], step: &[f64]| -> f64 { residual.iter().zip(step).map(|(r, s)| r * s).sum() };
+        let start = along(&self.residual, &self.step);
+        let (mut low, mut slope_low) = (0.0, start);
+        let (mut high, mut slope_high) = (1.0, 0.0);
+        let mut part = 1.0;
+        for _ in 0..MOST_LOOKS {
+            self.put_step(x, part);
+            self.assemble(x, free, fixed, h, false);
+            let slope = along(&self.residual, &self.step);
+            if slope.abs() <= FLAT * start || slope >= 0.0 && part == 1.0 {
+                return part;
+            }
+            if slope > 0.0 {
+                // Keeps the other end from standing still.
+                slope_high *= if low > 0.0 { 0.5 } else { 1.0 };
+                (low, slope_low) = (part, slope);
+            } else {
+                slope_low *= if slope_high < 0.0 { 0.5 } else { 1.0 };
+                (high, slope_high) = (part, slope);
+            }
+            part = low + (high - low) * slope_low / (slope_low - slope_high);
+            part = part.clamp(low + 0.01 * (high - low), high - 0.01 * (high - low));
+        }
+        part
     }
 
     /// Square of a residual's size: the kinetic energy of the velocities that it stands for, twice.
@@ -260,22 +296,26 @@ impl Coupled {
     }
 
     /// Residual `M (x - free) - h Σ forces` and its derivative.
-    fn assemble(&mut self, x: &[f64], free: &[f64], fixed: &[Motion], h: f64) {
-        self.matrix.zero();
+    fn assemble(&mut self, x: &[f64], free: &[f64], fixed: &[Motion], h: f64, with_matrix: bool) {
+        if with_matrix {
+            self.matrix.zero();
+        }
         self.residual.clear();
         for (block, mass) in self.masses.iter().enumerate() {
             let range = block * BLOCK..(block + 1) * BLOCK;
             let change =
                 Vector6::from_column_slice(&x[range.clone()]) - Vector6::from_column_slice(&free[range.clone()]);
             self.residual.extend_from_slice((mass * change).as_slice());
-            self.matrix.add(block, block, mass);
+            if with_matrix {
+                self.matrix.add(block, block, mass);
+            }
         }
         for index in 0..self.groups.len() {
             let group = self.groups[index];
             let relative = self.relative_of(&group, x, fixed);
             let mut slope = Matrix6::zeros();
-            let push = self.respond(&group, &relative, h, Some(&mut slope));
-            if slope == Matrix6::zeros() {
+            let push = self.respond(&group, &relative, h, with_matrix.then_some(&mut slope));
+            if push.all == Wrench::default() {
                 continue;
             }
             let members = &self.members[group.members.0..group.members.1];
@@ -289,6 +329,9 @@ impl Coupled {
                 let part = back * Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z);
                 for (residual, part) in self.residual[i as usize * BLOCK..].iter_mut().zip(part.iter()) {
                     *residual -= h * part;
+                }
+                if !with_matrix {
+                    continue;
                 }
                 let shifted = back * slope;
                 for other in &members[..=row] {
@@ -309,7 +352,7 @@ impl Coupled {
 
     /// Force and torque of a group on b at a relative velocity; to `slope` it adds minus `h` times their derivative by
     /// that velocity, without the part that would make it lopsided.
-    fn respond(&self, group: &Group, relative: &Twist, h: f64, mut slope: Option<&mut Matrix6<f64>>) -> Push {
+    fn respond(&self, group: &Group, relative: &Twist, h: f64, slope: Option<&mut Matrix6<f64>>) -> Push {
         let Material { dissipation, viscous, .. } = group.material;
         let grip = &group.grip;
         let since = Twist {
@@ -368,9 +411,9 @@ impl Coupled {
             let rate = spin.hypot(creep);
             let most = grip.coefficient * normal_load * grip.radius;
             push.all.torque -= axis * (most * spin / rate);
-            aa += axis * axis.transpose() * (most * creep * creep / (rate * rate * rate));
+            aa += axis * axis.transpose() * (most / rate * (1.0 - (spin / rate).powi(2)));
         }
-        if let Some(slope) = &mut slope {
+        if let Some(slope) = slope {
             slope.fixed_view_mut::<3, 3>(0, 0).copy_from(&(ll * h));
             slope.fixed_view_mut::<3, 3>(0, 3).copy_from(&(la * h));
             slope.fixed_view_mut::<3, 3>(3, 0).copy_from(&(la.transpose() * h));
