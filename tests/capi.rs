@@ -148,7 +148,7 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
         }
         body::isocoat_body_desc {
             struct_size, kind, isovalue, stiffness_scale, friction, static_friction, viscous_friction, dissipation,
-            category, mask, user_data,
+            category, mask, user_data, response, stiffness_rule, static_sink, contact_frequency, damping_ratio,
         }
         link::isocoat_link_desc {
             struct_size, kind, pose, linear_velocity, angular_velocity, mass, local_center_of_mass, inertia,
@@ -165,6 +165,7 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
         report::isocoat_event { kind, reserved, body_a, body_b }
         report::isocoat_counters {
             struct_size, bodies, links, skeletons, pairs, islands, substeps, patches, evaluations,
+            implicit_rounds, implicit_splits,
         }
         query::isocoat_ray_hit { body, link, skeleton, distance, position, normal }
         query::isocoat_surface_point { position, normal, distance, link, skeleton }

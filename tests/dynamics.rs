@@ -28,38 +28,6 @@ fn ball_link(kind: Kind, mass: f64, radius: f64, height: f64) -> LinkDesc {
     LinkDesc { kind, mass, inertia, pose: Pose::at(0.0, 0.0, height), ..LinkDesc::default() }
 }
 
-/// A host that integrates one body by semi-implicit Euler, as Bullet does, or in step.
-struct Host {
-    link: LinkId,
-    mass: f64,
-    inertia: f64,
-    convention: VelocityConvention,
-    state: LinkState,
-}
-
-impl Host {
-    fn tick(&mut self, world: &mut World, force: Vec3) {
-        world.set_link_state(self.link, &self.state).unwrap();
-        world.step(DT).unwrap();
-        let impulse = world.link_impulse(self.link).unwrap();
-        let acceleration = Vec3::new(0.0, 0.0, -G) + force / self.mass;
-        let Twist { linear, angular } = &mut self.state.twist;
-        *linear += impulse.force / self.mass;
-        *angular += impulse.torque / self.inertia;
-        match self.convention {
-            VelocityConvention::Leapfrog => {
-                *linear += acceleration * DT;
-                self.state.pose.position += *linear * DT;
-            }
-            VelocityConvention::Synchronous => {
-                self.state.pose.position += *linear * DT + acceleration * (0.5 * DT * DT);
-                *linear += acceleration * DT;
-            }
-        }
-        self.state.pose.rotation = advance_rotation(&self.state.pose.rotation, angular, DT);
-    }
-}
-
 /// A ball of 1 kg and 0.1 m under a host, at rest on a frictionless floor.
 fn resting_host(convention: VelocityConvention) -> (World, Host) {
     let mut world = world();

@@ -239,11 +239,17 @@ typedef struct isocoat_world isocoat_world;
 /** How contact forces act on the links in time: an ISOCOAT_RESPONSE_ value. */
 typedef uint32_t isocoat_response;
 
-/** The library chooses; today always ISOCOAT_RESPONSE_SUBSTEPPED. */
+/**
+ * The library chooses for each group of bodies in contact: ISOCOAT_RESPONSE_IMPLICIT for what is constrained, held by
+ * its host or stacked, ISOCOAT_RESPONSE_SUBSTEPPED for the rest.
+ */
 #define ISOCOAT_RESPONSE_AUTO 0u
 /** One evaluation of the forces a step, at its beginning: for small steps only. */
 #define ISOCOAT_RESPONSE_EXPLICIT 1u
-/** One implicit solve a step. Not in this version: gives ISOCOAT_ERROR_UNSUPPORTED. */
+/**
+ * Velocities and forces of all links in contact that agree at the end of the step: stable at any stiffness and mass,
+ * exact at rest; contacts do not bounce.
+ */
 #define ISOCOAT_RESPONSE_IMPLICIT 2u
 /** Many small steps inside each step; host-driven links through a mirror that lasts from step to step. */
 #define ISOCOAT_RESPONSE_SUBSTEPPED 3u
@@ -280,6 +286,15 @@ typedef struct isocoat_world_desc {
     double force_tolerance;
     /** Largest product of contact frequency and sub-step, in rad: from 0.01 to 1. Default 0.2. */
     double substep_phase;
+    /**
+     * Implicit response: motion of a contact between two rounds, over its depth, that ends them: from 1e-9 to 1.
+     * Default 0.05.
+     */
+    double implicit_tolerance;
+    /** Implicit response: most evaluations of a contact surface before the step is split: from 1 to 64. Default 8. */
+    uint32_t implicit_rounds;
+    /** Implicit response: how often a step that does not converge may be split in two: from 0 to 10. Default 4. */
+    uint32_t implicit_splits;
 } isocoat_world_desc;
 
 /** How much a message matters: an ISOCOAT_LOG_ value. More may come. */
@@ -438,6 +453,11 @@ typedef struct isocoat_body_desc {
     uint64_t mask;
     /** The host's own; given back, otherwise unused. Default NULL. */
     void *user_data;
+    /**
+     * How contact forces act on it in time: ISOCOAT_RESPONSE_AUTO leaves it to the world; what one body forces holds for
+     * all that it touches. Default ISOCOAT_RESPONSE_AUTO.
+     */
+    isocoat_response response;
 } isocoat_body_desc;
 
 /**
@@ -1212,12 +1232,16 @@ typedef struct isocoat_counters {
     uint32_t pairs;
     /** Groups of bodies that were stepped together. */
     uint32_t islands;
-    /** Sub-steps of the group that took the most. */
+    /** Sub-steps of the group that took the most, of those that were not solved implicitly. */
     uint32_t substeps;
     /** Pieces of contact surface at the end of the step. */
     uint32_t patches;
     /** Evaluations of a pair of fields. */
     uint64_t evaluations;
+    /** Rounds of the implicitly solved group that took the most, with those of all parts of a split step. */
+    uint32_t implicit_rounds;
+    /** Splits of the implicitly solved group that took the most. */
+    uint32_t implicit_splits;
 } isocoat_counters;
 
 /** One connected piece of contact surface between two coats. */

@@ -9,8 +9,8 @@ use super::guard::{free, isocoat_world, read, write};
 use super::handle::{isocoat_body, isocoat_link};
 use super::pointer::{List, Out};
 use super::status::{Checked, isocoat_status};
-use super::world::unknown;
-use crate::world::BodyDesc;
+use super::world::{isocoat_response, response_from_c, response_to_c, unknown};
+use crate::world::{BodyDesc, StiffnessRule};
 
 /// What a body is made of: an ISOCOAT_BODY_ value.
 pub type isocoat_body_kind = u32;
@@ -18,6 +18,18 @@ pub type isocoat_body_kind = u32;
 pub const ISOCOAT_BODY_DEFORMABLE: isocoat_body_kind = 0;
 /// Its coat keeps its shape; in a contact all the flesh that gives way is the other body's.
 pub const ISOCOAT_BODY_RIGID: isocoat_body_kind = 1;
+
+/// How a body's stiffness is said: an ISOCOAT_STIFFNESS_ value. With the last two, the pressure a unit of field follows
+/// from the body's mass, its skeletons and the world's gravity (or 9.80665 m/s^2 where there is none), for rest on a
+/// hard floor on all its skeletons; isocoat_body_get_stiffness() gives what comes out. Without mass or skeletons,
+/// stiffness_scale holds.
+pub type isocoat_stiffness_rule = u32;
+/// By stiffness_scale.
+pub const ISOCOAT_STIFFNESS_SCALE: isocoat_stiffness_rule = 0;
+/// By static_sink.
+pub const ISOCOAT_STIFFNESS_SINK: isocoat_stiffness_rule = 1;
+/// By contact_frequency and damping_ratio.
+pub const ISOCOAT_STIFFNESS_FREQUENCY: isocoat_stiffness_rule = 2;
 
 /// One object: what its coat is made of. Begin with isocoat_body_desc_default().
 #[derive(Clone, Copy, Debug)]
@@ -47,6 +59,18 @@ pub struct isocoat_body_desc {
     pub mask: u64,
     /// The host's own; given back, otherwise unused. Default NULL.
     pub user_data: *mut c_void,
+    /// How contact forces act on it in time: ISOCOAT_RESPONSE_AUTO leaves it to the world; what one body forces
+    /// holds for all that it touches. Default ISOCOAT_RESPONSE_AUTO.
+    pub response: isocoat_response,
+    /// How its stiffness is said. Default ISOCOAT_STIFFNESS_SCALE.
+    pub stiffness_rule: isocoat_stiffness_rule,
+    /// With ISOCOAT_STIFFNESS_SINK: sink under its own weight over the thickness, > 0 and at most 0.5. Default 0.05.
+    pub static_sink: f64,
+    /// With ISOCOAT_STIFFNESS_FREQUENCY: frequency of small swings on its contact, in Hz, > 0 and at most 1e6.
+    /// Default 10.
+    pub contact_frequency: f64,
+    /// With ISOCOAT_STIFFNESS_FREQUENCY: damping over the critical one, from 0 to 10; replaces dissipation. Default 0.
+    pub damping_ratio: f64,
 }
 
 // SAFETY: `repr(C)`, the size first, numbers and a pointer that is never followed.
@@ -61,6 +85,18 @@ unsafe impl Descriptor for isocoat_body_desc {
 
 impl From<&BodyDesc> for isocoat_body_desc {
     fn from(desc: &BodyDesc) -> Self {
+        let (mut static_sink, mut contact_frequency, mut damping_ratio) = (0.05, 10.0, 0.0);
+        let stiffness_rule = match desc.stiffness {
+            StiffnessRule::Scale => ISOCOAT_STIFFNESS_SCALE,
+            StiffnessRule::Sink { fraction } => {
+                static_sink = fraction;
+                ISOCOAT_STIFFNESS_SINK
+            }
+            StiffnessRule::Frequency { hertz, damping_ratio: ratio } => {
+                (contact_frequency, damping_ratio) = (hertz, ratio);
+                ISOCOAT_STIFFNESS_FREQUENCY
+            }
+        };
         Self {
             struct_size: 0,
             kind: if desc.rigid { ISOCOAT_BODY_RIGID } else { ISOCOAT_BODY_DEFORMABLE },
@@ -73,6 +109,11 @@ impl From<&BodyDesc> for isocoat_body_desc {
             category: desc.category,
             mask: desc.mask,
             user_data: desc.user_data as *mut c_void,
+            response: response_to_c(desc.response),
+            stiffness_rule,
+            static_sink,
+            contact_frequency,
+            damping_ratio,
         }
     }
 }
@@ -87,6 +128,14 @@ impl isocoat_body_desc {
             },
             isovalue: self.isovalue,
             stiffness_scale: self.stiffness_scale,
+            stiffness: match self.stiffness_rule {
+                ISOCOAT_STIFFNESS_SCALE => StiffnessRule::Scale,
+                ISOCOAT_STIFFNESS_SINK => StiffnessRule::Sink { fraction: self.static_sink },
+                ISOCOAT_STIFFNESS_FREQUENCY => {
+                    StiffnessRule::Frequency { hertz: self.contact_frequency, damping_ratio: self.damping_ratio }
+                }
+                other => return Err(unknown("stiffness_rule", other, "ISOCOAT_STIFFNESS_", 2)),
+            },
             friction: self.friction,
             static_friction: self.static_friction,
             viscous_friction: self.viscous_friction,
@@ -94,6 +143,7 @@ impl isocoat_body_desc {
             category: self.category,
             mask: self.mask,
             user_data: self.user_data as usize,
+            response: response_from_c(self.response)?,
         })
     }
 }
@@ -145,6 +195,35 @@ pub unsafe extern "C" fn isocoat_body_create(
 pub unsafe extern "C" fn isocoat_body_destroy(world: *mut isocoat_world, body: isocoat_body) -> isocoat_status {
     // SAFETY: NULL or a live world.
     unsafe { write(world, |inner| Ok(inner.world.destroy_body(body.into())?)) }
+}
+
+/// The stiffness of a body as its descriptor gives it, whichever rule it follows.
+///
+/// - world: not NULL.
+/// - body: the body.
+/// - stiffness_scale: receives the pressure a unit of field, in Pa; not NULL.
+/// - dissipation: receives the Hunt-Crossley dissipation, in s/m; not NULL.
+///
+/// Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
+#[must_use]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn isocoat_body_get_stiffness(
+    world: *const isocoat_world,
+    body: isocoat_body,
+    stiffness_scale: *mut f64,
+    dissipation: *mut f64,
+) -> isocoat_status {
+    // SAFETY: the pointers are NULL or as their lines say.
+    unsafe {
+        read(world, |inner| {
+            let scale_out = Out::new(stiffness_scale, "stiffness_scale")?;
+            let dissipation_out = Out::new(dissipation, "dissipation")?;
+            let (scale, damping) = inner.world.body_stiffness(body.into())?;
+            scale_out.put(scale);
+            dissipation_out.put(damping);
+            Ok(())
+        })
+    }
 }
 
 /// The descriptor of a body.

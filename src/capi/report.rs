@@ -149,12 +149,16 @@ pub struct isocoat_counters {
     pub pairs: u32,
     /// Groups of bodies that were stepped together.
     pub islands: u32,
-    /// Sub-steps of the group that took the most.
+    /// Sub-steps of the group that took the most, of those that were not solved implicitly.
     pub substeps: u32,
     /// Pieces of contact surface at the end of the step.
     pub patches: u32,
     /// Evaluations of a pair of fields.
     pub evaluations: u64,
+    /// Rounds of the implicitly solved group that took the most, with those of all parts of a split step.
+    pub implicit_rounds: u32,
+    /// Splits of the implicitly solved group that took the most.
+    pub implicit_splits: u32,
 }
 
 // SAFETY: `repr(C)`, the size first, integers only.
@@ -169,8 +173,19 @@ unsafe impl Descriptor for isocoat_counters {
 
 impl From<Counters> for isocoat_counters {
     fn from(counters: Counters) -> Self {
-        let Counters { bodies, links, skeletons, pairs, islands, substeps, patches, evaluations } = counters;
-        Self { struct_size: 0, bodies, links, skeletons, pairs, islands, substeps, patches, evaluations }
+        Self {
+            struct_size: 0,
+            bodies: counters.bodies,
+            links: counters.links,
+            skeletons: counters.skeletons,
+            pairs: counters.pairs,
+            islands: counters.islands,
+            substeps: counters.substeps,
+            patches: counters.patches,
+            evaluations: counters.evaluations,
+            implicit_rounds: counters.implicit_rounds,
+            implicit_splits: counters.implicit_splits,
+        }
     }
 }
 

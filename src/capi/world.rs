@@ -13,7 +13,8 @@ use crate::world::{BodyId, LogLevel, Response, Scheme, World, WorldDesc};
 
 /// How contact forces act on the links in time: an ISOCOAT_RESPONSE_ value.
 pub type isocoat_response = u32;
-/// The library chooses; today always ISOCOAT_RESPONSE_SUBSTEPPED.
+/// The library chooses for each group of bodies in contact: ISOCOAT_RESPONSE_IMPLICIT for what is constrained, held by
+/// its host or stacked, ISOCOAT_RESPONSE_SUBSTEPPED for the rest.
 pub const ISOCOAT_RESPONSE_AUTO: isocoat_response = 0;
 /// One evaluation of the forces a step, at its beginning: for small steps only.
 pub const ISOCOAT_RESPONSE_EXPLICIT: isocoat_response = 1;
@@ -86,12 +87,7 @@ impl From<&WorldDesc> for isocoat_world_desc {
     fn from(desc: &WorldDesc) -> Self {
         Self {
             struct_size: 0,
-            response: match desc.response {
-                Response::Auto => ISOCOAT_RESPONSE_AUTO,
-                Response::Explicit => ISOCOAT_RESPONSE_EXPLICIT,
-                Response::Implicit => ISOCOAT_RESPONSE_IMPLICIT,
-                Response::Substepped => ISOCOAT_RESPONSE_SUBSTEPPED,
-            },
+            response: response_to_c(desc.response),
             scheme: scheme_to_c(desc.scheme),
             seed_count: desc.seed_count,
             max_substeps: desc.max_substeps,
@@ -107,16 +103,9 @@ impl From<&WorldDesc> for isocoat_world_desc {
 
 impl isocoat_world_desc {
     fn to_rust(self) -> Checked<WorldDesc> {
-        let response = match self.response {
-            ISOCOAT_RESPONSE_AUTO => Response::Auto,
-            ISOCOAT_RESPONSE_EXPLICIT => Response::Explicit,
-            ISOCOAT_RESPONSE_SUBSTEPPED => Response::Substepped,
-            ISOCOAT_RESPONSE_IMPLICIT => Response::Implicit,
-            other => return Err(unknown("response", other, "ISOCOAT_RESPONSE_", 3)),
-        };
         Ok(WorldDesc {
             gravity: self.gravity.into(),
-            response,
+            response: response_from_c(self.response)?,
             scheme: scheme_from_c(self.scheme)?,
             force_tolerance: self.force_tolerance,
             seed_count: self.seed_count,
@@ -127,6 +116,25 @@ impl isocoat_world_desc {
             implicit_splits: self.implicit_splits,
         })
     }
+}
+
+pub(super) fn response_to_c(response: Response) -> isocoat_response {
+    match response {
+        Response::Auto => ISOCOAT_RESPONSE_AUTO,
+        Response::Explicit => ISOCOAT_RESPONSE_EXPLICIT,
+        Response::Implicit => ISOCOAT_RESPONSE_IMPLICIT,
+        Response::Substepped => ISOCOAT_RESPONSE_SUBSTEPPED,
+    }
+}
+
+pub(super) fn response_from_c(value: isocoat_response) -> Checked<Response> {
+    Ok(match value {
+        ISOCOAT_RESPONSE_AUTO => Response::Auto,
+        ISOCOAT_RESPONSE_EXPLICIT => Response::Explicit,
+        ISOCOAT_RESPONSE_IMPLICIT => Response::Implicit,
+        ISOCOAT_RESPONSE_SUBSTEPPED => Response::Substepped,
+        other => return Err(unknown("response", other, "ISOCOAT_RESPONSE_", 3)),
+    })
 }
 
 /// Refuses a value of an enum.

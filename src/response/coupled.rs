@@ -355,10 +355,8 @@ impl Coupled {
     fn respond(&self, group: &Group, relative: &Twist, h: f64, slope: Option<&mut Matrix6<f64>>) -> Push {
         let Material { dissipation, viscous, .. } = group.material;
         let grip = &group.grip;
-        let since = Twist {
-            linear: relative.linear - group.base.linear,
-            angular: relative.angular - group.base.angular,
-        };
+        let since =
+            Twist { linear: relative.linear - group.base.linear, angular: relative.angular - group.base.angular };
         let (mut normal_load, mut mean_normal) = (0.0, Vec3::zeros());
         let mut push = Push::default();
         // Everything about the centre; the slope as blocks.

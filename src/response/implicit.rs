@@ -457,22 +457,9 @@ impl Solver {
         -self.carriers.slip(&self.trial, &pair.origin, &approach.meeting).dot(&approach.direction)
     }
 
-    fn add_lone(
-        &mut self,
-        candidate: &Candidate,
-        index: u32,
-        approach: &deepest::Approach,
-        load: f64,
-        stiffness: f64,
-    ) {
+    fn add_lone(&mut self, candidate: &Candidate, index: u32, approach: &deepest::Approach, load: f64, stiffness: f64) {
         let first = self.coupled.points.len();
-        self.coupled.points.push(Point {
-            arm: Vec3::zeros(),
-            normal: approach.direction,
-            load,
-            stiffness,
-            area: 0.0,
-        });
+        self.coupled.points.push(Point { arm: Vec3::zeros(), normal: approach.direction, load, stiffness, area: 0.0 });
         let members = self.members(&candidate.pair, &approach.meeting);
         self.add_group(index, None, approach.meeting, (first, first + 1), members, candidate, Grip::default());
     }
@@ -481,8 +468,7 @@ impl Solver {
     fn agrees(&self, motions: &[Motion], candidates: &[Candidate], h: f64, tolerance: f64) -> bool {
         self.coupled.groups.iter().all(|group| {
             let now = self.coupled.relative_of(group, &self.x, motions);
-            let change =
-                Twist { linear: now.linear - group.base.linear, angular: now.angular - group.base.angular };
+            let change = Twist { linear: now.linear - group.base.linear, angular: now.angular - group.base.angular };
             let pair = &candidates[group.candidate as usize];
             let speed = self.speed(group, motions, h);
             let Some(patch) = group.patch else {

@@ -27,10 +27,22 @@ pub struct Mirror {
     expected_center: Vec3,
     expected_rotation: Quat,
     expected_twist: Twist,
+    /// Size of the change of velocity that the last impulse was to bring \[m/s\].
+    commanded: f64,
+    /// What the next impulse owes from when the mirror was last in use, as a change of velocity.
+    owed: Twist,
+    /// Steps for which the host counts as held by something that the library does not know.
+    doubt: u8,
 }
 
+/// Part of the commanded change of velocity by which a free host may be off.
+const OFF: f64 = 0.25;
+
+/// Steps of doubt after a host was off.
+const DOUBT: u8 = 10;
+
 /// What of the host matters to its mirror.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Host {
     /// Velocities as the host has them.
     pub twist: Twist,
@@ -49,11 +61,16 @@ impl Mirror {
             || rotation_to_vector(&(motion.rotation * self.expected_rotation.inverse())).norm() > TELEPORT_ANGLE;
         let teleported = self.active && jumped;
         self.active &= !jumped;
+        self.doubt = self.doubt.saturating_sub(1);
         motion.twist = if self.active {
-            Twist {
-                linear: self.twist.linear + (host.twist.linear - self.expected_twist.linear),
-                angular: self.twist.angular + (host.twist.angular - self.expected_twist.angular),
+            let off = Twist {
+                linear: host.twist.linear - self.expected_twist.linear,
+                angular: host.twist.angular - self.expected_twist.angular,
+            };
+            if off.linear.norm() > OFF * self.commanded {
+                self.doubt = DOUBT;
             }
+            Twist { linear: self.twist.linear + off.linear, angular: self.twist.angular + off.angular }
         } else {
             // A leapfrog host's velocities are half a tick old.
             let age = match host.convention {
@@ -93,6 +110,9 @@ impl Mirror {
             change.angular -= gyroscopic_change(rotation, local, inverse_local, &host.twist.angular, dt);
         }
         *self = Mirror {
+            commanded: change.linear.norm(),
+            doubt: self.doubt,
+            owed: Twist::default(),
             active: motion.touched,
             twist: motion.twist,
             expected_center: motion.center,
@@ -103,6 +123,41 @@ impl Mirror {
             },
         };
         impulse_for(&motion.inertia, rotation, &change)
+    }
+}
+
+/// Without the mirror: responses that end where the host's own velocities lead.
+impl Mirror {
+    /// Whether the host did not do what an impulse was to bring: it is held, or pushed hard.
+    pub fn is_doubtful(&self) -> bool {
+        self.doubt > 0
+    }
+
+    /// Sets the velocities of a motion that [`enter`](Self::enter) has prepared to those from which the host itself
+    /// starts. Of a mirror in use the velocities are taken over; the host is told the difference.
+    pub fn bypass(&mut self, host: &Host, motion: &mut Motion, dt: f64) {
+        // A synchronous host moves on with half of the acceleration only.
+        let ahead = match host.convention {
+            VelocityConvention::Leapfrog => 0.0,
+            VelocityConvention::Synchronous => 0.5 * dt,
+        };
+        let start = Twist {
+            linear: host.twist.linear - motion.acceleration * ahead,
+            angular: host.twist.angular - motion.angular_acceleration * ahead,
+        };
+        self.owed = Twist::default();
+        if self.active {
+            self.owed =
+                Twist { linear: motion.twist.linear - start.linear, angular: motion.twist.angular - start.angular };
+        } else {
+            motion.twist = start;
+        }
+        self.active = false;
+    }
+
+    /// The impulse for the difference that [`bypass`](Self::bypass) left.
+    pub fn handover(&self, inertia: &Inertia, rotation: &Quat) -> Wrench {
+        impulse_for(inertia, rotation, &self.owed)
     }
 }
 

@@ -74,15 +74,42 @@ fn validate_seed_count(count: u32) -> Result<()> {
     require("seed_count", count.into(), "from 4 to 65536", |x| (4.0..=65536.0).contains(&x))
 }
 
+/// How a user says how stiff a body is. Of the last two, the stiffness scale follows from the body's mass, its
+/// skeletons and the world's gravity, for rest on a hard floor on all its skeletons (docs/model.md, "Units"); without
+/// mass or skeletons, `stiffness_scale` holds.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum StiffnessRule {
+    /// `stiffness_scale` holds.
+    #[default]
+    Scale,
+    /// By how far it sinks into itself under its own weight.
+    Sink {
+        /// Sink over the thickness, > 0 and at most 0.5.
+        fraction: f64,
+    },
+    /// By how fast it swings on its contact.
+    Frequency {
+        /// Frequency of small swings about rest, > 0 \[Hz\].
+        hertz: f64,
+        /// Damping over the critical one, from 0 to 10: replaces `dissipation`.
+        damping_ratio: f64,
+    },
+}
+
 /// One deformable or rigid object.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BodyDesc {
     /// A rigid body keeps its shape; a contact's flesh is then all the other body's.
     pub rigid: bool,
+    /// How contact forces act on it in time; [`Response::Auto`] leaves it to the world. What one body forces holds
+    /// for all that it touches.
+    pub response: Response,
     /// Field value on the surface, `c` > 0.
     pub isovalue: f64,
     /// Pressure a unit of field, `K` > 0 \[Pa\].
     pub stiffness_scale: f64,
+    /// Another way to say how stiff it is, by which `K` is worked out.
+    pub stiffness: StiffnessRule,
     /// Coefficient of Coulomb friction, at least 0; a pair uses the geometric mean.
     pub friction: f64,
     /// Coefficient of static friction: 0, or at least `friction`; a pair uses the geometric mean.
@@ -103,8 +130,10 @@ impl Default for BodyDesc {
     fn default() -> Self {
         Self {
             rigid: false,
+            response: Response::Auto,
             isovalue: 1.0,
             stiffness_scale: 1e5,
+            stiffness: StiffnessRule::Scale,
             friction: 0.0,
             static_friction: 0.0,
             viscous_friction: 0.0,
@@ -121,6 +150,16 @@ impl BodyDesc {
         let not_negative = |what, value| require(what, value, "finite and at least 0", |x| x >= 0.0);
         require("isovalue", self.isovalue, "> 0 and at most 1e9", |x| x > 1e-9 && x <= 1e9)?;
         require("stiffness_scale", self.stiffness_scale, "> 0 and at most 1e18", |x| x > 0.0 && x <= 1e18)?;
+        match self.stiffness {
+            StiffnessRule::Scale => {}
+            StiffnessRule::Sink { fraction } => {
+                require("static_sink", fraction, "> 0 and at most 0.5", |x| x > 0.0 && x <= 0.5)?;
+            }
+            StiffnessRule::Frequency { hertz, damping_ratio } => {
+                require("contact_frequency", hertz, "> 0 and at most 1e6", |x| x > 0.0 && x <= 1e6)?;
+                require("damping_ratio", damping_ratio, "from 0 to 10", |x| (0.0..=10.0).contains(&x))?;
+            }
+        }
         not_negative("friction", self.friction)?;
         not_negative("viscous_friction", self.viscous_friction)?;
         not_negative("dissipation", self.dissipation)?;
@@ -155,8 +194,8 @@ pub struct LinkDesc {
     pub velocity_convention: VelocityConvention,
     /// Host-driven links: the host itself applies the gyroscopic torque.
     pub host_gyroscopic: bool,
-    /// Host-driven links: joints or host contacts act on it in this tick. Kept for the automatic choice of the response;
-    /// the responses there are today do not ask.
+    /// Host-driven links: joints or host contacts act on it in this tick, so that it does not move as its own mass
+    /// would. The automatic response is implicit then.
     pub constrained: bool,
     /// Host-driven links: the 6×6 matrix from wrench at the centre of mass (force, torque) to acceleration (linear,
     /// angular), in the world, where joints change it.

@@ -69,8 +69,12 @@ pub struct Counters {
     pub pairs: u32,
     /// Groups of bodies that were stepped together.
     pub islands: u32,
-    /// Sub-steps of the island that took the most.
+    /// Sub-steps of the island that took the most, of those not solved implicitly.
     pub substeps: u32,
+    /// Rounds of the implicitly solved island that took the most, with those of all parts of a split step.
+    pub implicit_rounds: u32,
+    /// Splits of the implicitly solved island that took the most.
+    pub implicit_splits: u32,
     /// Patches at the end of the step.
     pub patches: u32,
     /// Evaluations of a pair of fields.

@@ -84,7 +84,7 @@ impl World {
     fn fill_side(&self, side: &mut Side, body: &Body, motions: &[Motion], region: &(Vec3, Vec3), dt: f64) {
         side.clear();
         side.isovalue = body.desc.isovalue;
-        side.stiffness_scale = body.desc.stiffness_scale;
+        side.stiffness_scale = body.stiffness_scale;
         side.rigid = body.desc.rigid;
         for (link, index, skeleton) in self.skeletons_of(body) {
             let shape = skeleton.desc.shape;
@@ -140,15 +140,16 @@ fn swept(shape: &Shape, margin: f64, motion: &Motion, dt: f64) -> (Vec3, Vec3) {
 
 /// What two bodies make of their surfaces (the rules are those of [`BodyDesc`](super::BodyDesc)).
 fn material(a: &Body, b: &Body) -> Material {
+    let (scales, dissipations) = ([a.stiffness_scale, b.stiffness_scale], [a.dissipation, b.dissipation]);
     let (a, b) = (&a.desc, &b.desc);
     let mean = |x: f64, y: f64| (x * y).sqrt();
     // The softer a body, the more of the flesh that moves is its own: d = (K_b d_a + K_a d_b) / (K_a + K_b).
     let dissipation = match (a.rigid, b.rigid) {
-        (false, true) => a.dissipation,
-        (true, false) => b.dissipation,
+        (false, true) => dissipations[0],
+        (true, false) => dissipations[1],
         _ => {
-            let (ka, kb) = (a.stiffness_scale, b.stiffness_scale);
-            (kb * a.dissipation + ka * b.dissipation) / (ka + kb)
+            let [ka, kb] = scales;
+            (kb * dissipations[0] + ka * dissipations[1]) / (ka + kb)
         }
     };
     Material {

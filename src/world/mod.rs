@@ -8,6 +8,7 @@ pub mod draw;
 pub mod events;
 mod gather;
 pub mod query;
+mod respond;
 mod step;
 mod units;
 
@@ -15,7 +16,8 @@ use std::sync::atomic::{AtomicU16, Ordering};
 
 use crate::handle::{Arena, Noun};
 pub use desc::{
-    BodyDesc, BodyId, LinkDesc, LinkId, Response, Scheme, SkeletonDesc, SkeletonId, VelocityConvention, WorldDesc,
+    BodyDesc, BodyId, LinkDesc, LinkId, Response, Scheme, SkeletonDesc, SkeletonId, StiffnessRule, VelocityConvention,
+    WorldDesc,
 };
 pub use events::{Contact, Counters, Event, EventKind, LogLevel};
 
@@ -30,6 +32,12 @@ pub struct Body {
     pub(crate) desc: BodyDesc,
     pub(crate) links: Vec<u32>,
     pub(crate) enabled: bool,
+    /// What its descriptor comes to \[Pa\].
+    pub(crate) stiffness_scale: f64,
+    /// What its descriptor comes to \[s/m\].
+    pub(crate) dissipation: f64,
+    /// Steps for which it counts as part of a stack.
+    pub(crate) stacked: u8,
     /// What has been said about its units since its last change.
     pub(crate) units: units::Said,
 }
@@ -145,7 +153,15 @@ impl World {
     /// Changes the settings, from the next step on.
     pub fn set_desc(&mut self, desc: WorldDesc) -> Result<()> {
         desc.validate()?;
+        let gravity_changes = desc.gravity != self.desc.gravity;
         self.desc = desc;
+        if gravity_changes {
+            for index in 0..self.bodies.capacity() {
+                if self.bodies.is_live(index) {
+                    self.refresh(index);
+                }
+            }
+        }
         Ok(())
     }
 
@@ -162,7 +178,16 @@ impl World {
     /// Creates a body without links.
     pub fn create_body(&mut self, desc: BodyDesc) -> Result<BodyId> {
         desc.validate()?;
-        self.bodies.insert(Body { desc, links: Vec::new(), enabled: true, units: units::Said::default() })
+        let (stiffness_scale, dissipation) = (desc.stiffness_scale, desc.dissipation);
+        self.bodies.insert(Body {
+            desc,
+            links: Vec::new(),
+            enabled: true,
+            stiffness_scale,
+            dissipation,
+            stacked: 0,
+            units: units::Said::default(),
+        })
     }
 
     /// Destroys a body with its links and skeletons.
@@ -177,6 +202,12 @@ impl World {
     /// The descriptor of a body.
     pub fn body_desc(&self, id: BodyId) -> Result<&BodyDesc> {
         Ok(&self.bodies.get(id)?.desc)
+    }
+
+    /// Stiffness scale \[Pa\] and dissipation \[s/m\] of a body, as its [`StiffnessRule`] gives them.
+    pub fn body_stiffness(&self, id: BodyId) -> Result<(f64, f64)> {
+        let body = self.bodies.get(id)?;
+        Ok((body.stiffness_scale, body.dissipation))
     }
 
     /// Changes a body. A new isovalue must suit the profiles of all its skeletons.
@@ -307,14 +338,17 @@ impl World {
     }
 
     /// Brings what is derived from a body's parts up to date after a change of any of them.
-    fn refresh(&mut self, body: usize) {
-        self.bodies[body].units = units::Said::default();
-        let body = &self.bodies[body];
+    fn refresh(&mut self, slot: usize) {
+        self.bodies[slot].units = units::Said::default();
+        let body = &self.bodies[slot];
         let skeletons: Vec<u32> = self.skeletons_of(body).map(|(_, index, _)| index).collect();
         for index in &skeletons {
             let skeleton = &mut self.skeletons[*index as usize];
             skeleton.reach = crate::field::blend::reach(&skeleton.profile, skeletons.len());
         }
+        let derived = units::derive(self, body);
+        let body = &mut self.bodies[slot];
+        (body.stiffness_scale, body.dissipation) = derived;
     }
 
     /// Creates a skeleton of a link. A plane needs a link of kind fixed.

@@ -10,31 +10,35 @@ use crate::error::{Result, require};
 use crate::math::Wrench;
 use crate::response::mirror::Host;
 use crate::response::substep::{Island, Work};
-use crate::response::{Response, explicit, implicit, substepped};
+use crate::response::{Response, implicit};
 
 /// What the pipeline keeps between steps, and its buffers.
 #[derive(Default)]
 pub(crate) struct Stepping {
     /// One a slot of a link.
-    motions: Vec<Motion>,
+    pub(super) motions: Vec<Motion>,
+    /// How each link was moved, by slot.
+    pub(super) responses: Vec<Response>,
     bounds: Vec<Bounds>,
     bounds_of: Vec<usize>,
     pairs: Vec<[u32; 2]>,
     /// In the order of their bodies.
-    candidates: Vec<Candidate>,
+    pub(super) candidates: Vec<Candidate>,
     /// Those of the last step, then their memory for reuse.
     previous: Vec<Candidate>,
     spare: Vec<Candidate>,
-    islands: Vec<Island>,
-    island_count: usize,
+    pub(super) islands: Vec<Island>,
+    pub(super) island_count: usize,
     roots: Vec<u32>,
     island_of: Vec<u32>,
-    rates: Vec<f64>,
-    work: Work,
-    implicit: implicit::Solver,
+    /// Contacts at the end of the last step, by slot of the body.
+    pub(super) touches: Vec<u32>,
+    pub(super) rates: Vec<f64>,
+    pub(super) work: Work,
+    pub(super) implicit: implicit::Solver,
     contacts: Vec<Contact>,
     events: Vec<Event>,
-    counters: Counters,
+    pub(super) counters: Counters,
 }
 
 impl Stepping {
@@ -85,15 +89,15 @@ impl World {
                 continue;
             }
             let mut motion = self.motion_of(&self.links[index]);
-            let mirrored = self.is_mirrored(&self.links[index], &motion);
-            let teleport = if mirrored { 0.5 * self.thinnest(&self.links[index]) } else { 0.0 };
+            let hosted = self.links[index].desc.kind == Kind::Host;
+            let host = if hosted { self.host(&self.links[index]) } else { Host::default() };
             let link = &mut self.links[index];
-            if mirrored {
-                if link.mirror.enter(&host(link, teleport), &mut motion, dt) {
+            if hosted && motion.is_movable() {
+                if link.mirror.enter(&host, &mut motion, dt) {
                     let body = link.body;
                     state.forget_contacts_of(body);
                 }
-            } else if motion.is_movable() && link.desc.kind != Kind::Host {
+            } else if motion.is_movable() {
                 let pushed = motion.answer(&link.applied_impulse);
                 motion.twist.linear += pushed.linear;
                 motion.twist.angular += pushed.angular;
@@ -104,11 +108,6 @@ impl World {
             (link.applied_force, link.applied_impulse) = (Wrench::default(), Wrench::default());
             state.motions[index] = motion;
         }
-    }
-
-    fn is_mirrored(&self, link: &Link, motion: &Motion) -> bool {
-        link.desc.kind == Kind::Host && motion.is_movable() 
-            && matches!(self.desc.response, Response::Auto | Response::Substepped)
     }
 
     /// Pairs of bodies whose bounds meet and that may touch.
@@ -261,67 +260,6 @@ impl World {
         }
     }
 
-    fn respond(&mut self, state: &mut Stepping, dt: f64) {
-        let settings = surface::Settings { scheme: self.desc.scheme, tolerance: self.desc.force_tolerance };
-        let limits = substepped::Limits { phase: self.desc.substep_phase, most: self.desc.max_substeps };
-        let effort = implicit::Effort {
-            rounds: self.desc.implicit_rounds,
-            tolerance: self.desc.implicit_tolerance,
-            splits: self.desc.implicit_splits,
-        };
-        state.work.evaluations = 0;
-        let mut most = 0;
-        let mut short = 0.0f64;
-        for island in &state.islands[..state.island_count] {
-            let (motions, candidates, work) = (&mut state.motions, &mut state.candidates, &mut state.work);
-            match self.desc.response {
-                Response::Explicit => {
-                    explicit::step(motions, island, candidates, dt, &settings, work);
-                    most = most.max(1);
-                }
-                Response::Implicit => {
-                    let solver = &mut state.implicit;
-                    implicit::step(motions, island, candidates, dt, &settings, &effort, solver, work);
-                    most = most.max(solver.rounds);
-                }
-                Response::Auto | Response::Substepped => {
-                    let rates = &mut state.rates;
-                    let taken =
-                        substepped::step(motions, island, candidates, dt, &settings, &limits, rates, work);
-                    most = most.max(taken.substeps);
-                    short = short.max(taken.wanted / f64::from(taken.substeps));
-                }
-            }
-            // Kinematic links start every island from the host's pose.
-            for link in &island.links {
-                let motion = &mut motions[*link as usize];
-                if !motion.is_movable() {
-                    let desc = &self.links[*link as usize].desc;
-                    motion.center = desc.pose.transform_point(&desc.local_center);
-                    motion.rotation = desc.pose.rotation;
-                }
-            }
-        }
-        if short > 1.0
-            && let Some(log) = &mut self.log
-        {
-            let text = format!(
-                "the stiffest contact asks for {:.0} sub-steps, max_substeps allows {}: raise it, or lower \
-                 stiffness_scale or dt",
-                short * f64::from(self.desc.max_substeps),
-                self.desc.max_substeps
-            );
-            log(LogLevel::Warning, &text);
-        }
-        state.counters = Counters {
-            pairs: state.candidates.len() as u32,
-            islands: state.island_count as u32,
-            substeps: most,
-            evaluations: state.work.evaluations,
-            ..Counters::default()
-        };
-    }
-
     /// Writes back what moved, and what the host is to do.
     fn finish(&mut self, state: &mut Stepping, dt: f64) {
         for index in 0..self.links.capacity() {
@@ -329,8 +267,8 @@ impl World {
                 continue;
             }
             let motion = &state.motions[index];
-            let mirrored = self.is_mirrored(&self.links[index], motion);
-            let teleport = if mirrored { 0.5 * self.thinnest(&self.links[index]) } else { 0.0 };
+            let hosted = self.links[index].desc.kind == Kind::Host && motion.is_movable();
+            let host = if hosted { self.host(&self.links[index]) } else { Host::default() };
             let link = &mut self.links[index];
             link.contact_impulse = motion.contact_impulse;
             link.last_dt = dt;
@@ -340,15 +278,27 @@ impl World {
                     link.desc.pose = motion.pose();
                     link.desc.twist = motion.twist;
                 }
-                Kind::Host if mirrored => {
+                Kind::Host if hosted && state.responses[index] == Response::Substepped => {
                     let center = link.desc.pose.transform_point(&link.desc.local_center);
                     let rotation = link.desc.pose.rotation;
-                    let host = host(link, teleport);
                     link.host_impulse = link.mirror.leave(&host, motion, &center, &rotation, dt);
                 }
-                Kind::Host if motion.is_movable() => link.host_impulse = motion.contact_impulse,
+                Kind::Host if hosted => {
+                    link.host_impulse = link.mirror.handover(&motion.inertia, &link.desc.pose.rotation);
+                    link.host_impulse.add_scaled(&motion.contact_impulse, 1.0);
+                }
                 Kind::Host | Kind::Fixed => {}
             }
+        }
+    }
+
+    /// What of a host-driven link matters to its mirror.
+    pub(super) fn host(&self, link: &Link) -> Host {
+        Host {
+            twist: link.desc.twist,
+            convention: link.desc.velocity_convention,
+            gyroscopic: link.desc.host_gyroscopic,
+            teleport: 0.5 * self.thinnest(link),
         }
     }
 
@@ -451,15 +401,5 @@ impl World {
             self.contacts_of(&candidate, &mut contacts);
         }
         Ok(contacts)
-    }
-}
-
-/// What of a host-driven link matters to its mirror.
-fn host(link: &Link, teleport: f64) -> Host {
-    Host {
-        twist: link.desc.twist,
-        convention: link.desc.velocity_convention,
-        gyroscopic: link.desc.host_gyroscopic,
-        teleport,
     }
 }

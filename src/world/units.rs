@@ -1,10 +1,12 @@
-//! Units: whether a body's stiffness can carry its weight, and whether its speed suits its thickness.
+//! Units: whether a body's stiffness can carry its weight, and whether its speed suits its thickness; and the stiffness
+//! that a user gives as a sink or a frequency.
 
 use std::f64::consts::PI;
 
-use super::World;
-use crate::base::Motion;
-use crate::field::{Placed, Shape};
+use super::desc::{LinkDesc, StiffnessRule};
+use super::{Body, Skeleton, World};
+use crate::base::{Kind, Motion};
+use crate::field::Shape;
 
 /// What has been said about a body's units since its last change.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -34,10 +36,7 @@ pub(super) fn check(world: &World, index: usize, motions: &[Motion], dt: f64, sa
     if !said.sink {
         said.sink = true;
         let weight: f64 = movable().map(|motion| motion.acceleration.norm() / motion.inverse_mass()).sum();
-        let load = |skeleton: &super::Skeleton| {
-            let slope = body.desc.stiffness_scale * skeleton.profile.stiffness;
-            carried(&Placed { shape: skeleton.desc.shape, profile: skeleton.profile }, slope)
-        };
+        let load = |skeleton: &super::Skeleton| body.stiffness_scale * carried(skeleton, SINK);
         let most: f64 = skeletons().map(load).sum();
         if !body.desc.rigid && weight > most {
             say(&format!(
@@ -62,14 +61,65 @@ pub(super) fn check(world: &World, index: usize, motions: &[Motion], dt: f64, sa
     said
 }
 
-/// Force that a skeleton's coat carries on a hard floor at the deepest sink that works.
-fn carried(placed: &Placed, slope: f64) -> f64 {
-    let t = placed.profile.thickness;
-    let sink = SINK * t;
+/// Stiffness scale \[Pa\] and dissipation \[s/m\] of a body by what its descriptor says, for rest on a hard floor on all
+/// its skeletons, under gravity; or the standard gravity where a world has none.
+pub(super) fn derive(world: &World, body: &Body) -> (f64, f64) {
+    let desc = &body.desc;
+    let given = (desc.stiffness_scale, desc.dissipation);
+    let mass: f64 = body.links.iter().map(|link| &world.links[*link as usize].desc).map(mass_of).sum();
+    let gravity = match world.desc.gravity.norm() {
+        0.0 => STANDARD_GRAVITY,
+        gravity => gravity,
+    };
+    let carried_at = |sink: f64| world.skeletons_of(body).map(|(_, _, skeleton)| carried(skeleton, sink)).sum::<f64>();
+    let scale_at = |sink: f64| mass * gravity / carried_at(sink);
+    let usable = |scale: f64| scale.is_finite() && scale > 0.0;
+    match desc.stiffness {
+        StiffnessRule::Scale => given,
+        StiffnessRule::Sink { fraction } => match scale_at(fraction) {
+            scale if usable(scale) => (scale, desc.dissipation),
+            _ => given,
+        },
+        StiffnessRule::Frequency { hertz, damping_ratio } => {
+            let rate = 2.0 * PI * hertz;
+            let thickness = world.skeletons_of(body).map(|(_, _, skeleton)| skeleton.profile.thickness);
+            let thickness = thickness.fold(f64::INFINITY, f64::min);
+            // w² = (dF/ds) g / F at the sink of rest, which falls as the sink grows.
+            let rate2_at = |sink: f64| {
+                let step = 1e-4 * sink;
+                let slope = (carried_at(sink + step) - carried_at(sink - step)) / (2.0 * step * thickness);
+                slope * gravity / carried_at(sink)
+            };
+            let (mut low, mut high) = (1e-12, 1.0);
+            for _ in 0..80 {
+                let middle: f64 = (low * high as f64).sqrt();
+                if rate2_at(middle) > rate * rate { low = middle } else { high = middle }
+            }
+            match scale_at(low) {
+                // c = F d = 2 ζ m w with F = m g.
+                scale if usable(scale) => (scale, 2.0 * damping_ratio * rate / gravity),
+                _ => given,
+            }
+        }
+    }
+}
+
+/// Gravity for worlds without \[m/s²\].
+const STANDARD_GRAVITY: f64 = 9.806_65;
+
+fn mass_of(link: &LinkDesc) -> f64 {
+    if link.kind == Kind::Fixed { 0.0 } else { link.mass }
+}
+
+/// Force that a skeleton's coat carries on a hard floor at a sink of this fraction of its thickness, over the stiffness
+/// scale \[m²\].
+fn carried(skeleton: &Skeleton, fraction: f64) -> f64 {
+    let (t, slope) = (skeleton.profile.thickness, skeleton.profile.stiffness);
+    let sink = fraction * t;
     // Corners, edges and faces on the floor: ∫ of the pressure under a ball, a cylinder (chord law) and a plane.
     let corner = PI * slope * sink * sink * (t - 2.0 * sink / 3.0);
     let edge = slope * (4.0 / 3.0) * sink * (2.0 * t * sink).sqrt();
-    match &placed.shape {
+    match &skeleton.desc.shape {
         Shape::Point(_) => corner,
         Shape::Segment(a, b) => corner + edge * (b - a).norm(),
         Shape::Triangle(a, b, c) => {

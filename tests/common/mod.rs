@@ -5,8 +5,10 @@ pub mod oracle;
 
 use isocoat::base::Kind;
 use isocoat::field::Shape;
-use isocoat::math::{Pose, Quat, Vec3};
-use isocoat::world::{BodyDesc, BodyId, LinkDesc, LinkId, SkeletonDesc, World, WorldDesc};
+use isocoat::math::{Pose, Quat, Twist, Vec3, advance_rotation};
+use isocoat::world::{
+    BodyDesc, BodyId, LinkDesc, LinkId, LinkState, SkeletonDesc, VelocityConvention, World, WorldDesc,
+};
 use isocoat::world::{Contact, Scheme};
 
 /// A repeatable stream of random numbers (SplitMix64).
@@ -135,4 +137,41 @@ pub fn ball_inertia(mass: f64, radius: f64) -> isocoat::math::Mat3 {
 pub fn box_inertia(mass: f64, half: Vec3) -> isocoat::math::Mat3 {
     let s = half.component_mul(&half) * (mass / 3.0);
     isocoat::math::Mat3::from_diagonal(&Vec3::new(s.y + s.z, s.z + s.x, s.x + s.y))
+}
+
+/// Gravity of the scenes \[m/s²\].
+pub const G: f64 = 9.81;
+/// Step of the scenes \[s\].
+pub const DT: f64 = 1.0 / 60.0;
+
+/// A host that integrates one body by semi-implicit Euler, as Bullet does, or in step.
+pub struct Host {
+    pub link: LinkId,
+    pub mass: f64,
+    pub inertia: f64,
+    pub convention: VelocityConvention,
+    pub state: LinkState,
+}
+
+impl Host {
+    pub fn tick(&mut self, world: &mut World, force: Vec3) {
+        world.set_link_state(self.link, &self.state).unwrap();
+        world.step(DT).unwrap();
+        let impulse = world.link_impulse(self.link).unwrap();
+        let acceleration = Vec3::new(0.0, 0.0, -G) + force / self.mass;
+        let Twist { linear, angular } = &mut self.state.twist;
+        *linear += impulse.force / self.mass;
+        *angular += impulse.torque / self.inertia;
+        match self.convention {
+            VelocityConvention::Leapfrog => {
+                *linear += acceleration * DT;
+                self.state.pose.position += *linear * DT;
+            }
+            VelocityConvention::Synchronous => {
+                self.state.pose.position += *linear * DT + acceleration * (0.5 * DT * DT);
+                *linear += acceleration * DT;
+            }
+        }
+        self.state.pose.rotation = advance_rotation(&self.state.pose.rotation, angular, DT);
+    }
 }
