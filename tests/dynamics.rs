@@ -2,15 +2,12 @@
 
 mod common;
 
-use common::{Coat, ball_inertia, box_inertia};
+use common::{Coat, DT, G, Host, ball_inertia, box_inertia};
 use isocoat::base::Kind;
-use isocoat::math::{Pose, Twist, Vec3, advance_rotation, rotation_from_vector};
+use isocoat::math::{Pose, Twist, Vec3, rotation_from_vector};
 use isocoat::world::{
     BodyDesc, EventKind, LinkDesc, LinkId, LinkState, Response, Scheme, VelocityConvention, World, WorldDesc,
 };
-
-const G: f64 = 9.81;
-const DT: f64 = 1.0 / 60.0;
 
 fn world() -> World {
     World::new(WorldDesc { gravity: Vec3::new(0.0, 0.0, -G), ..WorldDesc::default() }).unwrap()

@@ -423,6 +423,21 @@ typedef uint32_t isocoat_body_kind;
 /** Its coat keeps its shape; in a contact all the flesh that gives way is the other body's. */
 #define ISOCOAT_BODY_RIGID 1u
 
+/**
+ * How a body's stiffness is said: an ISOCOAT_STIFFNESS_ value. With the last two, the pressure a unit of field follows
+ * from the body's mass, its skeletons and the world's gravity (or 9.80665 m/s^2 where there is none), for rest on a
+ * hard floor on all its skeletons; isocoat_body_get_stiffness() gives what comes out. Without mass or skeletons,
+ * stiffness_scale holds.
+ */
+typedef uint32_t isocoat_stiffness_rule;
+
+/** By stiffness_scale. */
+#define ISOCOAT_STIFFNESS_SCALE 0u
+/** By static_sink. */
+#define ISOCOAT_STIFFNESS_SINK 1u
+/** By contact_frequency and damping_ratio. */
+#define ISOCOAT_STIFFNESS_FREQUENCY 2u
+
 /** One object: what its coat is made of. Begin with isocoat_body_desc_default(). */
 typedef struct isocoat_body_desc {
     /** Size of this struct in bytes, as the host knows it. */
@@ -454,10 +469,23 @@ typedef struct isocoat_body_desc {
     /** The host's own; given back, otherwise unused. Default NULL. */
     void *user_data;
     /**
-     * How contact forces act on it in time: ISOCOAT_RESPONSE_AUTO leaves it to the world; what one body forces holds for
-     * all that it touches. Default ISOCOAT_RESPONSE_AUTO.
+     * How contact forces act on it in time: ISOCOAT_RESPONSE_AUTO leaves it to the world; what one body forces
+     * holds for all that it touches. Default ISOCOAT_RESPONSE_AUTO.
      */
     isocoat_response response;
+    /** How its stiffness is said. Default ISOCOAT_STIFFNESS_SCALE. */
+    isocoat_stiffness_rule stiffness_rule;
+    /** With ISOCOAT_STIFFNESS_SINK: sink under its own weight over the thickness, > 0 and at most 0.5. Default 0.05. */
+    double static_sink;
+    /**
+     * With ISOCOAT_STIFFNESS_FREQUENCY: frequency of small swings on its contact, in Hz, > 0 and at most 1e6.
+     * Default 10.
+     */
+    double contact_frequency;
+    /**
+     * With ISOCOAT_STIFFNESS_FREQUENCY: damping over the critical one, from 0 to 10; replaces dissipation. Default 0.
+     */
+    double damping_ratio;
 } isocoat_body_desc;
 
 /**
@@ -493,6 +521,22 @@ isocoat_status isocoat_body_create(isocoat_world *world,
  * Errors: INVALID_HANDLE. Threads: changes the world.
  */
 ISOCOAT_MUST_USE isocoat_status isocoat_body_destroy(isocoat_world *world, isocoat_body body);
+
+/**
+ * The stiffness of a body as its descriptor gives it, whichever rule it follows.
+ *
+ * - world: not NULL.
+ * - body: the body.
+ * - stiffness_scale: receives the pressure a unit of field, in Pa; not NULL.
+ * - dissipation: receives the Hunt-Crossley dissipation, in s/m; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_body_get_stiffness(const isocoat_world *world,
+                                          isocoat_body body,
+                                          double *stiffness_scale,
+                                          double *dissipation);
 
 /**
  * The descriptor of a body.

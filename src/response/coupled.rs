@@ -51,13 +51,46 @@ impl Member {
         }
     }
 
-    /// The same as a matrix.
-    fn map(&self) -> Matrix6<f64> {
-        let mut matrix = Matrix6::identity();
-        if self.turns {
-            matrix.fixed_view_mut::<3, 3>(0, 3).copy_from(&-self.arm.cross_matrix());
-        } else {
-            matrix.fixed_view_mut::<3, 3>(3, 3).fill(0.0);
+    /// What a wrench about the group's centre is to the link.
+    fn wrench(&self, about_center: &Wrench) -> Wrench {
+        let torque = if self.turns { about_center.torque + self.arm.cross(&about_center.force) } else { Vec3::zeros() };
+        Wrench { force: about_center.force, torque }
+    }
+
+    /// Rows of a slope about the group's centre, as rows about the link's: [`wrench`](Self::wrench) of each column.
+    fn back(&self, slope: &Slope) -> Slope {
+        if !self.turns {
+            return Slope { al: Mat3::zeros(), aa: Mat3::zeros(), ..*slope };
+        }
+        let cross = self.arm.cross_matrix();
+        Slope { al: slope.al + cross * slope.ll, aa: slope.aa + cross * slope.la, ..*slope }
+    }
+
+    /// Columns of a slope about the group's centre, as columns for the link's velocities: [`twist`](Self::twist) of each
+    /// row.
+    fn forth(&self, slope: &Slope) -> Slope {
+        if !self.turns {
+            return Slope { la: Mat3::zeros(), aa: Mat3::zeros(), ..*slope };
+        }
+        let cross = self.arm.cross_matrix();
+        Slope { la: slope.la - slope.ll * cross, aa: slope.aa - slope.al * cross, ..*slope }
+    }
+}
+
+/// A matrix from velocities to wrenches, in four blocks: force and torque by linear and angular velocity.
+#[derive(Clone, Copy, Debug, Default)]
+struct Slope {
+    ll: Mat3,
+    la: Mat3,
+    al: Mat3,
+    aa: Mat3,
+}
+
+impl Slope {
+    fn to_matrix(self, scale: f64) -> Matrix6<f64> {
+        let mut matrix = Matrix6::zeros();
+        for (row, column, block) in [(0, 0, self.ll), (0, 3, self.la), (3, 0, self.al), (3, 3, self.aa)] {
+            matrix.fixed_view_mut::<3, 3>(row, column).copy_from(&(block * scale));
         }
         matrix
     }
@@ -212,10 +245,8 @@ impl Coupled {
             self.matrix.solve(&mut self.step);
             self.base.clear();
             self.base.extend_from_slice(x);
-            let part = self.lowest_along(x, free, fixed, h);
-            self.put_step(x, part);
             let last = norm;
-            self.assemble(x, free, fixed, h, true);
+            self.go_lowest(x, free, fixed, h);
             norm = self.norm(&self.residual);
             // Sums of contact forces round off.
             if norm > 0.9 * last && norm <= 1e-16 * scale {
@@ -231,19 +262,23 @@ impl Coupled {
         }
     }
 
-    /// How much of the step to take: where the slope along it has fallen to a small part.
-    fn lowest_along(&mut self, x: &mut [f64], free: &[f64], fixed: &[Motion], h: f64) -> f64 {
+    /// Takes the step to where the slope along it has fallen to a small part, and assembles the system there.
+    fn go_lowest(&mut self, x: &mut [f64], free: &[f64], fixed: &[Motion], h: f64) {
         let along = |residual: &[f64], step: &[f64]| -> f64 { residual.iter().zip(step).map(|(r, s)| r * s).sum() };
         let start = along(&self.residual, &self.step);
         let (mut low, mut slope_low) = (0.0, start);
         let (mut high, mut slope_high) = (1.0, 0.0);
         let mut part = 1.0;
-        for _ in 0..MOST_LOOKS {
+        for look in 0..MOST_LOOKS {
             self.put_step(x, part);
-            self.assemble(x, free, fixed, h, false);
+            // Nearly all steps are good as a whole.
+            self.assemble(x, free, fixed, h, look == 0);
             let slope = along(&self.residual, &self.step);
             if slope.abs() <= FLAT * start || slope >= 0.0 && part == 1.0 {
-                return part;
+                if look == 0 {
+                    return;
+                }
+                break;
             }
             if slope > 0.0 {
                 // Keeps the other end from standing still.
@@ -256,7 +291,8 @@ impl Coupled {
             part = low + (high - low) * slope_low / (slope_low - slope_high);
             part = part.clamp(low + 0.01 * (high - low), high - 0.01 * (high - low));
         }
-        part
+        self.put_step(x, part);
+        self.assemble(x, free, fixed, h, true);
     }
 
     /// Square of a residual's size: the kinetic energy of the velocities that it stands for, twice.
@@ -313,7 +349,7 @@ impl Coupled {
         for index in 0..self.groups.len() {
             let group = self.groups[index];
             let relative = self.relative_of(&group, x, fixed);
-            let mut slope = Matrix6::zeros();
+            let mut slope = Slope::default();
             let push = self.respond(&group, &relative, h, with_matrix.then_some(&mut slope));
             if push.all == Wrench::default() {
                 continue;
@@ -324,22 +360,22 @@ impl Coupled {
                 if i == NONE {
                     continue;
                 }
-                let back = member.map().transpose() * member.weight;
-                let (force, torque) = (&push.all.force, &push.all.torque);
-                let part = back * Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z);
-                for (residual, part) in self.residual[i as usize * BLOCK..].iter_mut().zip(part.iter()) {
-                    *residual -= h * part;
+                let part = member.wrench(&push.all);
+                let residual = &mut self.residual[i as usize * BLOCK..];
+                for axis in 0..3 {
+                    residual[axis] -= h * member.weight * part.force[axis];
+                    residual[3 + axis] -= h * member.weight * part.torque[axis];
                 }
                 if !with_matrix {
                     continue;
                 }
-                let shifted = back * slope;
+                let shifted = member.back(&slope);
                 for other in &members[..=row] {
                     let j = self.blocks[other.link as usize];
                     if j == NONE {
                         continue;
                     }
-                    let block = shifted * other.map() * other.weight;
+                    let block = other.forth(&shifted).to_matrix(h * member.weight * other.weight);
                     if i > j || i == j && other.link == member.link {
                         self.matrix.add(i as usize, j as usize, &block);
                     } else {
@@ -350,9 +386,8 @@ impl Coupled {
         }
     }
 
-    /// Force and torque of a group on b at a relative velocity; to `slope` it adds minus `h` times their derivative by
-    /// that velocity, without the part that would make it lopsided.
-    fn respond(&self, group: &Group, relative: &Twist, h: f64, slope: Option<&mut Matrix6<f64>>) -> Push {
+    /// Force and torque of a group on b at a relative velocity; in `slope` minus their derivative by that velocity, without the part that would make it lopsided.
+    fn respond(&self, group: &Group, relative: &Twist, h: f64, slope: Option<&mut Slope>) -> Push {
         let Material { dissipation, viscous, .. } = group.material;
         let grip = &group.grip;
         let since =
@@ -379,43 +414,53 @@ impl Coupled {
             } else {
                 0.0
             };
-            let mut matrix = point.normal * point.normal.transpose() * (stiff - drag);
-            matrix += Mat3::identity() * drag;
+            let mut matrix = None;
+            if drag > 0.0 {
+                let along = point.normal * point.normal.transpose();
+                matrix = Some(Mat3::identity() * drag - along * drag);
+            }
             if grip.coefficient > 0.0 && load > 0.0 {
                 normal_load += load;
                 mean_normal += point.normal * load;
                 let wanted = grip.slip + grip.spin.cross(&point.arm);
                 let slip = velocity - wanted;
                 let slip = slip - point.normal * slip.dot(&point.normal);
-                let speed = slip.norm().hypot(grip.creep);
-                let most = grip.coefficient * load;
-                force -= slip * (most / speed);
-                let plane = Mat3::identity() - point.normal * point.normal.transpose();
-                matrix += (plane - slip * slip.transpose() / (speed * speed)) * (most / speed);
+                let speed = (slip.norm_squared() + grip.creep * grip.creep).sqrt();
+                let most = grip.coefficient * load / speed;
+                force -= slip * most;
+                if slope.is_some() {
+                    let plane = Mat3::identity() - point.normal * point.normal.transpose();
+                    let resists = (plane - slip * slip.transpose() / (speed * speed)) * most;
+                    matrix = Some(matrix.map_or(resists, |drag| drag + resists));
+                }
             }
             push.all.add_force_at(&force, &point.arm);
             if slope.is_some() {
-                // d(force)/d(linear, angular) = matrix (I, -[arm]), and the torque is [arm] times the force.
-                let cross = point.arm.cross_matrix();
-                ll += matrix;
-                la -= matrix * cross;
-                aa -= cross * matrix * cross;
+                let lever = point.arm.cross(&point.normal);
+                let stiff_normal = point.normal * stiff;
+                ll += stiff_normal * point.normal.transpose();
+                la += stiff_normal * lever.transpose();
+                aa += lever * lever.transpose() * stiff;
+                if let Some(matrix) = matrix {
+                    // d(force)/d(linear, angular) = matrix (I, -[arm]), and the torque is [arm] times the force.
+                    let cross = point.arm.cross_matrix();
+                    ll += matrix;
+                    la -= matrix * cross;
+                    aa -= cross * matrix * cross;
+                }
             }
         }
         if grip.radius > 0.0 && normal_load > 0.0 && mean_normal != Vec3::zeros() {
             let axis = mean_normal.normalize();
             let spin = (relative.angular - grip.spin).dot(&axis);
             let creep = grip.creep / grip.radius;
-            let rate = spin.hypot(creep);
+            let rate = (spin * spin + creep * creep).sqrt();
             let most = grip.coefficient * normal_load * grip.radius;
             push.all.torque -= axis * (most * spin / rate);
             aa += axis * axis.transpose() * (most / rate * (1.0 - (spin / rate).powi(2)));
         }
         if let Some(slope) = slope {
-            slope.fixed_view_mut::<3, 3>(0, 0).copy_from(&(ll * h));
-            slope.fixed_view_mut::<3, 3>(0, 3).copy_from(&(la * h));
-            slope.fixed_view_mut::<3, 3>(3, 0).copy_from(&(la.transpose() * h));
-            slope.fixed_view_mut::<3, 3>(3, 3).copy_from(&(aa * h));
+            *slope = Slope { ll, la, al: la.transpose(), aa };
         }
         push
     }

@@ -31,12 +31,20 @@ pub struct Mirror {
     commanded: f64,
     /// What the next impulse owes from when the mirror was last in use, as a change of velocity.
     owed: Twist,
+    /// What joints and contacts of the host's own seem to do to it, as an acceleration; while it is held.
+    estimate: Twist,
+    /// Where the last impulse should have brought a held host's velocities; they are known.
+    bypassed: Option<Twist>,
     /// Steps for which the host counts as held by something that the library does not know.
     doubt: u8,
 }
 
 /// Part of the commanded change of velocity by which a free host may be off.
 const OFF: f64 = 0.25;
+
+/// Part of what a held host was off that goes into the estimate of its other accelerations. Stable while the host's
+/// effective mass is at most ten times the link's (docs/model.md, "Held hosts").
+const LEARN: f64 = 0.1;
 
 /// Steps of doubt after a host was off.
 const DOUBT: u8 = 10;
@@ -112,7 +120,6 @@ impl Mirror {
         *self = Mirror {
             commanded: change.linear.norm(),
             doubt: self.doubt,
-            owed: Twist::default(),
             active: motion.touched,
             twist: motion.twist,
             expected_center: motion.center,
@@ -121,6 +128,7 @@ impl Mirror {
                 linear: mean.linear + motion.acceleration * after,
                 angular: mean.angular + motion.angular_acceleration * after,
             },
+            ..Mirror::default()
         };
         impulse_for(&motion.inertia, rotation, &change)
     }
@@ -134,8 +142,19 @@ impl Mirror {
     }
 
     /// Sets the velocities of a motion that [`enter`](Self::enter) has prepared to those from which the host itself
-    /// starts. Of a mirror in use the velocities are taken over; the host is told the difference.
-    pub fn bypass(&mut self, host: &Host, motion: &mut Motion, dt: f64) {
+    /// starts. Of a mirror in use the velocities are taken over; the host is told the difference. Of a `held` host, what
+    /// holds it is estimated from how far it was off.
+    pub fn bypass(&mut self, host: &Host, motion: &mut Motion, held: bool, dt: f64) {
+        if let Some(expected) = self.bypassed.take().filter(|_| held) {
+            self.estimate.linear += (host.twist.linear - expected.linear) * (LEARN / dt);
+            self.estimate.angular += (host.twist.angular - expected.angular) * (LEARN / dt);
+        }
+        if !held {
+            self.estimate = Twist::default();
+        }
+        if self.estimate.linear.norm() * dt > OFF * self.commanded {
+            self.doubt = DOUBT;
+        }
         // A synchronous host moves on with half of the acceleration only.
         let ahead = match host.convention {
             VelocityConvention::Leapfrog => 0.0,
@@ -153,11 +172,24 @@ impl Mirror {
             motion.twist = start;
         }
         self.active = false;
+        motion.acceleration += self.estimate.linear;
+        motion.angular_acceleration += self.estimate.angular;
     }
 
-    /// The impulse for the difference that [`bypass`](Self::bypass) left.
-    pub fn handover(&self, inertia: &Inertia, rotation: &Quat) -> Wrench {
-        impulse_for(inertia, rotation, &self.owed)
+    /// Takes a bypassed motion at the end of the tick, and gives the impulse for the host.
+    pub fn hand_over(&mut self, host: &Host, motion: &Motion, rotation: &Quat, dt: f64) -> Wrench {
+        let rest = match host.convention {
+            VelocityConvention::Leapfrog => 0.0,
+            VelocityConvention::Synchronous => 0.5 * dt,
+        };
+        self.bypassed = Some(Twist {
+            linear: motion.twist.linear + motion.acceleration * rest,
+            angular: motion.twist.angular + motion.angular_acceleration * rest,
+        });
+        self.commanded = motion.answer(&motion.contact_impulse).linear.norm();
+        let mut impulse = impulse_for(&motion.inertia, rotation, &self.owed);
+        impulse.add_scaled(&motion.contact_impulse, 1.0);
+        impulse
     }
 }
 

@@ -129,7 +129,11 @@ impl World {
                 && response != Response::Substepped
             {
                 let host = self.host(&self.links[slot]);
-                self.links[slot].mirror.bypass(&host, &mut state.motions[slot], dt);
+                let link = &mut self.links[slot];
+                // With the effective inertia, the host's own answer is known.
+                let known = link.desc.inverse_effective_inertia.is_some();
+                let held = !known && (link.desc.constrained || link.mirror.is_doubtful());
+                link.mirror.bypass(&host, &mut state.motions[slot], held, dt);
             }
         }
     }

@@ -284,8 +284,7 @@ impl World {
                     link.host_impulse = link.mirror.leave(&host, motion, &center, &rotation, dt);
                 }
                 Kind::Host if hosted => {
-                    link.host_impulse = link.mirror.handover(&motion.inertia, &link.desc.pose.rotation);
-                    link.host_impulse.add_scaled(&motion.contact_impulse, 1.0);
+                    link.host_impulse = link.mirror.hand_over(&host, motion, &link.desc.pose.rotation, dt);
                 }
                 Kind::Host | Kind::Fixed => {}
             }
