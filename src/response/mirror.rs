@@ -42,6 +42,9 @@ pub struct Mirror {
 /// Part of the commanded change of velocity by which a free host may be off.
 const OFF: f64 = 0.25;
 
+/// Part of a host's speed that its rounding may take.
+const ROUNDING: f64 = 1e-3;
+
 /// Part of what a held host was off that goes into the estimate of its other accelerations. Stable while the host's
 /// effective mass is at most ten times the link's (docs/model.md, "Held hosts").
 const LEARN: f64 = 0.1;
@@ -75,7 +78,9 @@ impl Mirror {
                 linear: host.twist.linear - self.expected_twist.linear,
                 angular: host.twist.angular - self.expected_twist.angular,
             };
-            if off.linear.norm() > OFF * self.commanded {
+            // A host that computes with fewer digits is off by its rounding.
+            let rounding = ROUNDING * (host.twist.linear.norm() + motion.acceleration.norm() * dt);
+            if off.linear.norm() > OFF * self.commanded + rounding {
                 self.doubt = DOUBT;
             }
             Twist { linear: self.twist.linear + off.linear, angular: self.twist.angular + off.angular }

@@ -92,7 +92,7 @@ pub(super) fn derive(world: &World, body: &Body) -> (f64, f64) {
             };
             let (mut low, mut high) = (1e-12, 1.0);
             for _ in 0..80 {
-                let middle: f64 = (low * high as f64).sqrt();
+                let middle = f64::sqrt(low * high);
                 if rate2_at(middle) > rate * rate { low = middle } else { high = middle }
             }
             match scale_at(low) {
