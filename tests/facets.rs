@@ -174,13 +174,19 @@ fn facets_meet_the_tolerance_and_their_estimate_bounds_the_error() {
             let count = 40;
             for trial in 0..count {
                 let pair = scene.pair((scene.place)(&mut random));
-                let fine = run(&pair, Scheme::Auto, 1e-7);
-                if fine.force.norm() == 0.0 || fine.estimate > 1e-7 { skipped += 1; continue; }
+                let fine = [1e-7, 1e-6, 1e-5].into_iter().map(|t| run(&pair, Scheme::Auto, t)).find(|f| f.facets);
+                let Some(fine) = fine else { skipped += 1; continue };
                 let got = run(&pair, Scheme::Auto, tolerance);
                 let error = (got.force - fine.force).norm() / fine.force.norm();
                 errors.push(error);
-                bounded += usize::from(error <= got.estimate + 1e-7);
-                if std::env::var("VERBOSE").is_ok() && (error > got.estimate || !got.facets) {
+                bounded += usize::from(error <= got.estimate + fine.estimate);
+                if std::env::var("VERBOSE").is_ok() && (error > got.estimate + fine.estimate || !got.facets) {
+                    let mut surface = Surface::default();
+                    for (s, t) in [(Scheme::Auto, 5e-3), (Scheme::Auto, 1e-7), (Scheme::Adaptive, 5e-3), (Scheme::Polar, 5e-3)] {
+                        integrate(&pair, &Settings { scheme: s, tolerance: t }, &mut surface);
+                        let f: Vec3 = surface.nodes.iter().map(|node| node.force).sum();
+                        println!("     {s:?} {t:.0e} {:.6} {:?} {:?}", f.norm(), surface.patches.iter().map(|p| (p.scheme, p.evaluations, p.nodes.1 - p.nodes.0, p.error_estimate, p.overloaded)).collect::<Vec<_>>(), surface.maxima().iter().map(|m| (m.position, m.normal, m.sum)).collect::<Vec<_>>());
+                    }
                     println!("   {trial}: {error:.1e} {:.1e} {} {}", got.estimate, got.evaluations, got.facets);
                 }
                 evaluations.push(got.evaluations);
@@ -241,7 +247,7 @@ fn tilt_changes_the_force_smoothly() {
     for tilt in [0.0, 1e-14, 1e-12, 1e-10, 1e-8, 1e-6, 1e-5, 1e-4, 1e-3, 3e-3, 1e-2, 2e-2, 3e-2, 5e-2, 0.1, 0.15, 0.2] {
         let rotation = rotation_from_vector(&(Vec3::new(1.0, 0.7, 0.0) * tilt));
         let pair = scene.pair((Pose::default(), Pose { position: Vec3::new(0.0, 0.0, 0.245), rotation }));
-        let fine = run(&pair, Scheme::Auto, 1e-7);
+        let fine = run(&pair, Scheme::Auto, 1e-6);
         let got = run(&pair, Scheme::Auto, 5e-3);
         println!("{tilt:.0e}: {:.12e} {:.2e} fine {:.12e} est {:.1e} {} {}", got.force.z, (got.force - fine.force).norm() / fine.force.norm(), fine.force.z, fine.estimate, got.evaluations, got.nodes);
         let _ = got.torque;
