@@ -8,17 +8,15 @@ use common::{Coat, Random};
 use isocoat::contact::pair::{Pair, Side};
 use isocoat::contact::surface::{Settings, Surface, integrate};
 use isocoat::field::{Placed, Profile, Shape};
-use isocoat::math::{Mat3, Pose, Vec3, rotation_from_vector};
+use isocoat::math::{Pose, Vec3, rotation_from_vector};
 use isocoat::world::Scheme;
 
 /// A coat in place, its profile stiffening by `stiffening`.
 fn side(coat: &Coat, pose: &Pose, stiffening: f64) -> Side {
-    let mut side =
-        Side { isovalue: 1.0, stiffness_scale: coat.stiffness_scale, rigid: coat.rigid, ..Side::default() };
+    let mut side = Side { isovalue: 1.0, stiffness_scale: coat.stiffness_scale, rigid: coat.rigid, ..Side::default() };
     for shape in &coat.shapes {
         let stiffness = 2.0 / (coat.radius - coat.thickness);
-        let profile =
-            Profile::new(1.0, coat.thickness, stiffness, stiffening, coat.radius, shape.is_solid()).unwrap();
+        let profile = Profile::new(1.0, coat.thickness, stiffness, stiffening, coat.radius, shape.is_solid()).unwrap();
         side.skeletons.push(Placed { shape: shape.transformed(pose), profile });
         side.locals.push(*shape);
         side.reach.push(coat.thickness * 1.5);
@@ -38,31 +36,30 @@ struct Scene {
     place: fn(&mut Random) -> (Pose, Pose),
 }
 
-impl Scene {
-    fn pair(&self, poses: (Pose, Pose)) -> Pair {
-        let mut pair = Pair::default();
-        pair.a = side(&self.a, &poses.0, self.stiffening);
-        pair.b = side(&self.b, &poses.1, self.stiffening);
-        pair.prepare();
-        pair
-    }
+/// Two coats in place.
+fn pair_of(a: (&Coat, &Pose), b: (&Coat, &Pose), stiffening: f64) -> Pair {
+    let mut pair = Pair::default();
+    pair.a = side(a.0, a.1, stiffening);
+    pair.b = side(b.0, b.1, stiffening);
+    pair.prepare();
+    pair
 }
 
-struct Result {
+/// What a query comes to.
+struct Outcome {
     force: Vec3,
-    torque: Vec3,
     estimate: f64,
     evaluations: f64,
     nodes: f64,
+    /// All patches were integrated by facets.
     facets: bool,
 }
 
-fn run(pair: &Pair, scheme: Scheme, tolerance: f64) -> Result {
+fn run(pair: &Pair, tolerance: f64) -> Outcome {
     let mut surface = Surface::default();
-    integrate(pair, &Settings { scheme, tolerance }, &mut surface);
-    Result {
+    integrate(pair, &Settings { scheme: Scheme::Auto, tolerance }, &mut surface);
+    Outcome {
         force: surface.nodes.iter().map(|node| node.force).sum(),
-        torque: surface.nodes.iter().map(|node| node.position.cross(&node.force)).sum(),
         estimate: surface.patches.iter().map(|patch| patch.error_estimate).fold(0.0, f64::max),
         evaluations: f64::from(surface.evaluations),
         nodes: surface.nodes.len() as f64,
@@ -94,9 +91,9 @@ fn triangle() -> Coat {
 fn on_floor(random: &mut Random, lean: f64, coat: &Coat, tip: Vec3) -> (Pose, Pose) {
     let rotation = turned(random, lean, 3.0) * rotation_from_vector(&tip);
     let points: Vec<Vec3> = match coat.shapes[0] {
-        Shape::Box { half, .. } => (0..8)
-            .map(|k| Vec3::from_fn(|i, _| if k >> i & 1 == 1 { half[i] } else { -half[i] }))
-            .collect(),
+        Shape::Box { half, .. } => {
+            (0..8).map(|k| Vec3::from_fn(|i, _| if k >> i & 1 == 1 { half[i] } else { -half[i] })).collect()
+        }
         Shape::Segment(a, b) => vec![a, b],
         Shape::Triangle(a, b, c) => vec![a, b, c],
         _ => vec![Vec3::zeros()],
@@ -130,88 +127,131 @@ fn scenes() -> Vec<Scene> {
         scene("box on box, square", cuboid(), cuboid().stiff(2e5), |random| {
             let z = 0.3 - random.range(0.005, 0.02);
             let rotation = turned(random, 0.02, 1e-3);
-            (Pose::default(), Pose { position: Vec3::new(random.range(-0.2, 0.2), random.range(-0.2, 0.2), z), rotation })
+            (
+                Pose::default(),
+                Pose { position: Vec3::new(random.range(-0.2, 0.2), random.range(-0.2, 0.2), z), rotation },
+            )
         }),
         scene("box on box, turned", cuboid(), cuboid().stiff(2e5), stacked),
         scene("segment on box", cuboid(), segment(), |random| {
             let rotation = turned(random, 0.05, 3.0);
             let z = 0.25 - random.range(0.005, 0.03);
-            (Pose::default(), Pose { position: Vec3::new(random.range(-0.2, 0.2), random.range(-0.1, 0.1), z), rotation })
+            (
+                Pose::default(),
+                Pose { position: Vec3::new(random.range(-0.2, 0.2), random.range(-0.1, 0.1), z), rotation },
+            )
         }),
         scene("segments side by side", segment(), segment().stiff(3e5), |random| {
             let rotation = turned(random, 0.05, 0.2);
             let z = 0.2 - random.range(0.005, 0.03);
-            (Pose::default(), Pose { position: Vec3::new(random.range(-0.4, 0.4), random.range(-0.05, 0.05), z), rotation })
+            (
+                Pose::default(),
+                Pose { position: Vec3::new(random.range(-0.4, 0.4), random.range(-0.05, 0.05), z), rotation },
+            )
         }),
         scene("box edge on box", cuboid(), cuboid().stiff(2e5), |random| {
             let rotation = turned(random, 0.05, 3.0) * rotation_from_vector(&Vec3::new(0.8, 0.0, 0.0));
             let lowest = 0.15 * libm::sin(0.8) + 0.1 * libm::cos(0.8);
             let z = 0.2 + lowest - random.range(0.01, 0.02);
-            (Pose::default(), Pose { position: Vec3::new(random.range(-0.1, 0.1), random.range(-0.1, 0.1), z), rotation })
-        }),
-        scene("box-ball", cuboid(), Coat::ball(0.1), |random| {
-            (Pose::default(), Pose::at(random.range(-0.25, 0.25), random.range(-0.2, 0.2), 0.235))
-        }),
-        scene("triangle-ball", triangle(), Coat::ball(0.1), |random| {
-            (Pose::default(), Pose::at(random.range(-0.3, 0.3), random.range(-0.25, 0.2), 0.182))
+            (
+                Pose::default(),
+                Pose { position: Vec3::new(random.range(-0.1, 0.1), random.range(-0.1, 0.1), z), rotation },
+            )
         }),
     ];
-    scenes.push(Scene { name: "stiffening box on plane", stiffening: 3.0, ..scene("", floor(), cuboid(), box_leaning) });
+    scenes.push(Scene {
+        name: "stiffening box on plane",
+        stiffening: 3.0,
+        ..scene("", floor(), cuboid(), box_leaning)
+    });
     scenes.push(Scene { name: "stiffening boxes", stiffening: 2.0, ..scene("", cuboid(), cuboid(), stacked) });
     scenes
 }
 
+/// Worst and mean figures of a scene at a tolerance.
+#[derive(Default)]
+struct Figures {
+    errors: Vec<f64>,
+    bounded: f64,
+    evaluations: Vec<f64>,
+    nodes: Vec<f64>,
+    facets: f64,
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+fn most(values: &[f64]) -> f64 {
+    values.iter().copied().fold(0.0, f64::max)
+}
+
 #[test]
-fn facets_meet_the_tolerance_and_their_estimate_bounds_the_error() {
-    let only = std::env::var("ONLY").unwrap_or_default();
-    println!("pair, tolerance: error mean, p95, worst; share bounded by the estimate; evaluations mean, most; nodes mean, most; facets");
+fn faces_and_edges_meet_the_tolerance_in_few_evaluations() {
+    println!(
+        "pair, tolerance: mean and worst error; share bounded by the estimate; mean and most evaluations; mean and \
+         most nodes; share by facets"
+    );
+    let mut failures = Vec::new();
+    let (mut bounded, mut total) = (0.0, 0.0);
     for scene in scenes() {
-        if !scene.name.contains(&only) { continue; }
+        let plane = scene.name.contains("plane");
+        let mut random = Random(23);
+        // What errors are measured against: the finest that facets reach.
+        let cases: Vec<(Pair, Outcome)> = (0..40)
+            .filter_map(|_| {
+                let poses = (scene.place)(&mut random);
+                let pair = pair_of((&scene.a, &poses.0), (&scene.b, &poses.1), scene.stiffening);
+                let finest = if plane { [1e-6, 1e-5] } else { [5e-5, 2e-4] };
+                let fine = finest.into_iter().map(|t| run(&pair, t)).find(|fine| fine.facets)?;
+                (fine.force.norm() > 0.0).then_some((pair, fine))
+            })
+            .collect();
+        if cases.len() < 20 {
+            failures.push(format!("{}: {} of 40 poses by facets", scene.name, cases.len()));
+        }
         for tolerance in [5e-3, 5e-4] {
-            let mut random = Random(23);
-            let (mut errors, mut bounded, mut evaluations, mut nodes, mut facets) = (vec![], 0, vec![], vec![], 0);
-            let mut skipped = 0;
-            let count = 40;
-            for trial in 0..count {
-                let pair = scene.pair((scene.place)(&mut random));
-                let fine = [1e-7, 1e-6, 1e-5].into_iter().map(|t| run(&pair, Scheme::Auto, t)).find(|f| f.facets);
-                let Some(fine) = fine else { skipped += 1; continue };
-                let got = run(&pair, Scheme::Auto, tolerance);
+            let mut figures = Figures::default();
+            for (pair, fine) in &cases {
+                let got = run(pair, tolerance);
                 let error = (got.force - fine.force).norm() / fine.force.norm();
-                errors.push(error);
-                bounded += usize::from(error <= got.estimate + fine.estimate);
-                if std::env::var("VERBOSE").is_ok() && (error > got.estimate + fine.estimate || !got.facets) {
-                    let mut surface = Surface::default();
-                    for (s, t) in [(Scheme::Auto, 5e-3), (Scheme::Auto, 1e-7), (Scheme::Adaptive, 5e-3), (Scheme::Polar, 5e-3)] {
-                        integrate(&pair, &Settings { scheme: s, tolerance: t }, &mut surface);
-                        let f: Vec3 = surface.nodes.iter().map(|node| node.force).sum();
-                        println!("     {s:?} {t:.0e} {:.6} {:?} {:?}", f.norm(), surface.patches.iter().map(|p| (p.scheme, p.evaluations, p.nodes.1 - p.nodes.0, p.error_estimate, p.overloaded)).collect::<Vec<_>>(), surface.maxima().iter().map(|m| (m.position, m.normal, m.sum)).collect::<Vec<_>>());
-                    }
-                    println!("   {trial}: {error:.1e} {:.1e} {} {}", got.estimate, got.evaluations, got.facets);
-                }
-                evaluations.push(got.evaluations);
-                nodes.push(got.nodes);
-                facets += usize::from(got.facets);
+                figures.errors.push(error);
+                figures.bounded += f64::from(error <= got.estimate + fine.estimate);
+                figures.evaluations.push(got.evaluations);
+                figures.nodes.push(got.nodes);
+                figures.facets += f64::from(got.facets);
             }
-            errors.sort_by(f64::total_cmp);
-            let n = errors.len();
-            if n == 0 { println!("{}: no reference", scene.name); continue; }
-            let mean = |v: &[f64]| v.iter().sum::<f64>() / n as f64;
-            let most = |v: &[f64]| v.iter().copied().fold(0.0, f64::max);
+            let count = cases.len() as f64;
             println!(
-                "{} {tolerance:.0e}: {:.1e} {:.1e} {:.1e}; {:.0}%; {:.0} {:.0}; {:.0} {:.0}; {}% skipped {skipped}",
-                scene.name, mean(&errors), errors[n * 95 / 100], errors[n - 1], 100.0 * bounded as f64 / n as f64,
-                mean(&evaluations), most(&evaluations), mean(&nodes), most(&nodes), 100 * facets / n
+                "{}, {tolerance:.0e}: {:.1e} {:.1e}; {:.0}%; {:.0} {:.0}; {:.0} {:.0}; {:.0}%",
+                scene.name,
+                mean(&figures.errors),
+                most(&figures.errors),
+                100.0 * figures.bounded / count,
+                mean(&figures.evaluations),
+                most(&figures.evaluations),
+                mean(&figures.nodes),
+                most(&figures.nodes),
+                100.0 * figures.facets / count
             );
+            bounded += figures.bounded;
+            total += count;
+            let (evaluations, nodes) = if tolerance > 1e-3 { (150.0, 100.0) } else { (400.0, 150.0) };
+            let dear = mean(&figures.evaluations) > evaluations || most(&figures.nodes) > nodes;
+            if most(&figures.errors) > tolerance || plane && dear {
+                failures.push(format!("{} at {tolerance:.0e}", scene.name));
+            }
         }
     }
+    assert!(failures.is_empty(), "{failures:#?}");
+    assert!(bounded >= 0.95 * total, "the estimate bounds {bounded} of {total}");
 }
 
 /// Force of a coat on a hard floor at a height, `∫ p dA` over a fine grid.
 fn on_hard_floor(coat: &Coat, pose: &Pose, height: f64) -> f64 {
     let shape = coat.shapes[0].transformed(pose);
     let (low, high) = shape.bounds(coat.thickness);
-    let n = 3000;
+    let n = 2000;
     let (dx, dy) = ((high.x - low.x) / n as f64, (high.y - low.y) / n as f64);
     let slope = 2.0 / (coat.radius - coat.thickness) * coat.stiffness_scale;
     let mut sum = 0.0;
@@ -225,32 +265,54 @@ fn on_hard_floor(coat: &Coat, pose: &Pose, height: f64) -> f64 {
 }
 
 #[test]
-fn reference_agrees_with_a_fine_grid() {
+fn faces_on_a_hard_floor_agree_with_a_fine_grid() {
+    let mut failures = Vec::new();
     for (name, coat, lean) in [("box", cuboid(), 0.2), ("segment", segment(), 0.2), ("triangle", triangle(), 0.1)] {
-        let scene = Scene { name, a: Coat::floor(0.1).hard(), b: coat.clone(), stiffening: 1.0, place: |_| unreachable!() };
         let mut random = Random(5);
         for _ in 0..6 {
             let poses = on_floor(&mut random, lean, &coat, Vec3::zeros());
             let exact = on_hard_floor(&coat, &poses.1, 0.1);
-            for tolerance in [5e-3, 1e-6] {
-                let got = run(&scene.pair(poses), Scheme::Auto, tolerance);
+            let pair = pair_of((&Coat::floor(0.1).hard(), &poses.0), (&coat, &poses.1), 1.0);
+            for tolerance in [5e-2, 5e-3, 5e-4, 5e-5] {
+                let got = run(&pair, tolerance);
                 let error = (got.force.z / exact - 1.0).abs();
-                println!("{name} {tolerance:.0e}: {error:.1e} estimate {:.1e} {} {} {}", got.estimate, got.evaluations, got.nodes, got.facets);
+                let (estimate, evaluations) = (got.estimate, got.evaluations);
+                println!("{name} {tolerance:.0e}: {error:.1e} (estimate {estimate:.1e}) {evaluations} evaluations");
+                // The grid itself is good to 1e-6.
+                if error > tolerance + 1e-6 || !got.facets {
+                    failures.push(format!("{name} {tolerance:.0e}: {error:.1e}"));
+                }
             }
         }
     }
+    assert!(failures.is_empty(), "{failures:#?}");
 }
 
 #[test]
-fn tilt_changes_the_force_smoothly() {
-    let scene = Scene { name: "", a: Coat::floor(0.1), b: cuboid(), stiffening: 1.0, place: |_| unreachable!() };
-    for tilt in [0.0, 1e-14, 1e-12, 1e-10, 1e-8, 1e-6, 1e-5, 1e-4, 1e-3, 3e-3, 1e-2, 2e-2, 3e-2, 5e-2, 0.1, 0.15, 0.2] {
-        let rotation = rotation_from_vector(&(Vec3::new(1.0, 0.7, 0.0) * tilt));
-        let pair = scene.pair((Pose::default(), Pose { position: Vec3::new(0.0, 0.0, 0.245), rotation }));
-        let fine = run(&pair, Scheme::Auto, 1e-6);
-        let got = run(&pair, Scheme::Auto, 5e-3);
-        println!("{tilt:.0e}: {:.12e} {:.2e} fine {:.12e} est {:.1e} {} {}", got.force.z, (got.force - fine.force).norm() / fine.force.norm(), fine.force.z, fine.estimate, got.evaluations, got.nodes);
-        let _ = got.torque;
+fn a_face_on_the_floor_does_not_notice_a_hair_of_tilt() {
+    for size in [1e-4, 1.0, 1e4] {
+        let box_of = |half: Vec3, thickness: f64| Coat::cuboid(half * size, thickness * size);
+        let (floor, cuboid) = (Coat::floor(0.1 * size), box_of(Vec3::new(0.2, 0.15, 0.1), 0.05));
+        let force = |tilt: f64, offset: f64| {
+            let rotation = rotation_from_vector(&(Vec3::new(1.0, 0.7, 0.0) * tilt));
+            let position = Vec3::new(0.0, 0.0, (0.245 + offset) * size);
+            let pair = pair_of((&floor, &Pose::default()), (&cuboid, &Pose { position, rotation }), 1.0);
+            let got = run(&pair, 5e-3);
+            assert!(got.facets, "{size} {tilt}");
+            got.force.z / (size * size)
+        };
+        let flat = force(0.0, 0.0);
+        for exponent in -14..=-5 {
+            let tilted = force(libm::pow(10.0, f64::from(exponent)), 0.0);
+            assert!((tilted / flat - 1.0).abs() < 1e-7, "{size}: 1e{exponent}: {tilted} {flat}");
+        }
+        // A sweep: a pose further, the force is never off what its neighbours say by the tolerance.
+        for (tilt, offset) in [(1e-3, 0.0), (0.0, 1e-4)] {
+            let sweep: Vec<f64> = (0..40).map(|k| force(tilt * f64::from(k), -offset * f64::from(k))).collect();
+            for at in sweep.windows(3) {
+                let bend = at[0] - 2.0 * at[1] + at[2];
+                assert!(bend.abs() < 5e-3 * at[1], "{size}: {at:?}");
+            }
+        }
     }
-    let _ = Mat3::identity();
 }

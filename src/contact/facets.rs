@@ -51,7 +51,13 @@ const ALONG: [Rule; 4] = [
             0.239_314_335_249_683_23,
             0.118_463_442_528_094_54,
         ],
-        coarse: &[0.040_834_993_366_481_11, 0.459_165_006_633_518_9, 0.0, 0.459_165_006_633_518_9, 0.040_834_993_366_481_11],
+        coarse: &[
+            0.040_834_993_366_481_11,
+            0.459_165_006_633_518_9,
+            0.0,
+            0.459_165_006_633_518_9,
+            0.040_834_993_366_481_11,
+        ],
     },
     Rule {
         s: &[
@@ -93,7 +99,12 @@ const OUTWARDS: [Rule; 3] = [
     },
     Rule {
         s: &[0.057_104_196_114_517_68, 0.276_843_013_638_123_83, 0.583_590_432_368_916_8, 0.860_240_135_656_219_4],
-        weight: &[0.143_713_560_791_225_94, 0.281_356_015_149_462_06, 0.311_826_522_975_741_25, 0.223_103_901_083_570_74],
+        weight: &[
+            0.143_713_560_791_225_94,
+            0.281_356_015_149_462_06,
+            0.311_826_522_975_741_25,
+            0.223_103_901_083_570_74,
+        ],
         coarse: &[0.077_494_147_201_332_5, 0.485_364_077_392_588_8, 0.0, 0.543_336_748_638_037_2],
     },
     Rule {
@@ -356,11 +367,7 @@ impl Polygon {
             }
             if (ahead <= 0.0) != (ahead_next <= 0.0) {
                 let t = ahead / (ahead - ahead_next);
-                let meeting = Corner {
-                    at: between(p.at, q.at, t),
-                    height: p.height + t * (q.height - p.height),
-                    ..*p
-                };
+                let meeting = Corner { at: between(p.at, q.at, t), height: p.height + t * (q.height - p.height), ..*p };
                 part.push(if ahead <= 0.0 { Corner { normal, owner, ..meeting } } else { meeting });
             }
         }
@@ -481,7 +488,13 @@ pub fn integrate(
         let Some((frame, polygon)) = layout(pair, at, faces) else { continue };
         let mut solver = Solver { pair, frame, accept: 0.0, border_step: 0.0, evaluations };
         solver.aim(at.sum, tolerance);
-        let mut work = Work { solver, workspace, peak: at.sum, curvature: 0.0, bend: 0.0, slopes: (0.0, 0.0) };
+        let [i, j] = at.skeletons;
+        let endless = |shape: &Shape| matches!(shape, Shape::Plane { .. });
+        let against_plane = endless(&pair.a.skeletons[i].shape) || endless(&pair.b.skeletons[j].shape);
+        let alone = pair.a.skeletons.len() + pair.b.skeletons.len() == 2;
+        let distrust = if against_plane && alone { 0.0 } else { CROSSING };
+        let mut work =
+            Work { solver, workspace, peak: at.sum, curvature: 0.0, bend: 0.0, slopes: (0.0, 0.0), distrust };
         let error = work.integrate(at, polygon, tolerance, outline);
         evaluations = work.solver.evaluations;
         if let Some(error) = error {
@@ -501,11 +514,8 @@ impl Workspace {
     }
 }
 
-/// What is left of a difference between a rule and a coarser one: the better rule errs by about its square, where the
-/// fields are smooth, and they are within a piece.
-fn trusted(difference: f64, size: f64) -> f64 {
-    if difference < size { difference * difference / size } else { difference }
-}
+/// Part of a difference between two rules that stays, where edges of both coats may cross within a piece.
+const CROSSING: f64 = 0.15;
 
 struct Work<'a, 'b> {
     solver: Solver<'a>,
@@ -517,6 +527,8 @@ struct Work<'a, 'b> {
     bend: f64,
     /// Slopes of the surface over the facet.
     slopes: Place,
+    /// Least part of a difference between two rules that counts as error.
+    distrust: f64,
 }
 
 impl Work<'_, '_> {
@@ -687,6 +699,13 @@ impl Work<'_, '_> {
     /// Sets up the strips and fans round the facet, counter-clockwise.
     fn arrange(&mut self, polygon: &Polygon, level: usize) {
         let count = polygon.count;
+        // Where edges of both coats cross aslant, a break runs through a piece: two points along would not see it.
+        let aslant = |index: usize| {
+            let (p, q) = (&polygon.corners[index], polygon.next(index));
+            let coats = p.owner != Owner::Pressure && q.owner != Owner::Pressure && p.owner != q.owner;
+            coats && (0.02..0.9998).contains(&dot(p.normal, q.normal).abs())
+        };
+        let level = if (0..count).any(aslant) { level.max(1) } else { level };
         let size = polygon.corners().iter().map(|c| c.at.0.hypot(c.at.1)).fold(0.0, f64::max);
         // Where the strip of the edge before a corner ends, and where that of the edge after it begins: at right angles,
         // as the coat of one skeleton has it; but where edges of two cross, along the other's. Where the pressure ends
@@ -745,8 +764,11 @@ impl Work<'_, '_> {
     /// polygon are always inside. Exact for a pressure that is linear, and for its torque.
     fn flat(&mut self, polygon: Polygon) -> Option<Flat> {
         let first = self.workspace.pool.len();
-        let mut flat =
-            Flat { polygon, halving: ((0.0, 0.0), (1.0, 0.0)), tally: Tally { nodes: (first, first), ..Tally::default() } };
+        let mut flat = Flat {
+            polygon,
+            halving: ((0.0, 0.0), (1.0, 0.0)),
+            tally: Tally { nodes: (first, first), ..Tally::default() },
+        };
         let Some((area, center, axes, spread)) = polygon.moments() else { return Some(flat) };
         let middle = self.solver.column(center.0, center.1, self.over(center, &polygon.corners[0]))?;
         let density = self.density(center, &middle);
@@ -771,9 +793,15 @@ impl Work<'_, '_> {
             bends[axis] = bend.norm();
         }
         flat.tally.nodes.1 = self.workspace.pool.len();
-        flat.tally.error = trusted(0.25 * area * (bends[0] + bends[1]), flat.tally.force.norm());
+        flat.tally.error = self.trusted(0.25 * area * (bends[0] + bends[1]), flat.tally.force.norm());
         flat.halving = (center, axes[usize::from(bends[1] > bends[0])]);
         Some(flat)
+    }
+
+    /// What is left of the difference between a rule and a coarser one: the better rule errs by about its square where
+    /// the fields are smooth within a piece.
+    fn trusted(&self, difference: f64, size: f64) -> f64 {
+        if difference < size { difference * (difference / size).max(self.distrust) } else { difference }
     }
 
     /// Height over a place of the facet as a corner predicts it.
@@ -822,7 +850,8 @@ impl Work<'_, '_> {
                 }
                 let spread = if wing.fan { reach * measure.1 } else { measure.0 + r * measure.1 };
                 let unit = reach * spread;
-                if let Some(node) = self.solver.node(place.0, place.1, &column, along.weight[index] * weight[k] * unit) {
+                if let Some(node) = self.solver.node(place.0, place.1, &column, along.weight[index] * weight[k] * unit)
+                {
                     let density = node.force / (along.weight[index] * weight[k]);
                     line += density * weight[k];
                     line_coarse += density * coarse[k];
@@ -841,7 +870,7 @@ impl Work<'_, '_> {
         let size = force.norm();
         self.workspace.wings[index].tally = Tally {
             force,
-            error: trusted(radially.norm(), size) + trusted(coarsely.norm(), size),
+            error: self.trusted(radially.norm(), size) + self.trusted(coarsely.norm(), size),
             nodes: (first, self.workspace.pool.len()),
         };
         Some(())
@@ -904,7 +933,14 @@ impl Wing {
         let rise = between(start.rise, end.rise, t);
         if self.fan {
             let turn = libm::atan2(cross(first, last), dot(first, last));
-            return Spoke { from: start.at, height, sum, rise, direction: rotated(first, turn * t), measure: (0.0, turn * rate) };
+            return Spoke {
+                from: start.at,
+                height,
+                sum,
+                rise,
+                direction: rotated(first, turn * t),
+                measure: (0.0, turn * rate),
+            };
         }
         let direction = between(first, last, t);
         let along = (end.at.0 - start.at.0, end.at.1 - start.at.1);
@@ -932,6 +968,10 @@ impl Wing {
     }
 
     fn spoke_at_middle(&self) -> Place {
-        if self.fan { Wing { narrow: [false; 2], ..*self }.spoke(0.5).direction } else { between(self.rays[0], self.rays[1], 0.5) }
+        if self.fan {
+            Wing { narrow: [false; 2], ..*self }.spoke(0.5).direction
+        } else {
+            between(self.rays[0], self.rays[1], 0.5)
+        }
     }
 }
