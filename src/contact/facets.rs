@@ -36,10 +36,10 @@ struct Rule {
 
 /// Along an edge, or round a corner: Gauss-Legendre.
 const ALONG: [Rule; 4] = [
-    Rule { s: &[0.211_324_865_405_187_12, 0.788_675_134_594_812_9], weight: &[0.5, 0.5], coarse: &[1.0, 0.0] },
+    Rule { s: &[0.211_324_865_405_187_1, 0.788_675_134_594_812_9], weight: &[0.5, 0.5], coarse: &[1.0, 0.0] },
     Rule {
         s: &[0.112_701_665_379_258_31, 0.5, 0.887_298_334_620_741_7],
-        weight: &[0.277_777_777_777_777_8, 0.444_444_444_444_444_44, 0.277_777_777_777_777_8],
+        weight: &[0.277_777_777_777_777_8, 0.444_444_444_444_444_4, 0.277_777_777_777_777_8],
         coarse: &[0.5, 0.0, 0.5],
     },
     Rule {
@@ -61,7 +61,7 @@ const ALONG: [Rule; 4] = [
     },
     Rule {
         s: &[
-            0.025_446_043_828_620_738,
+            0.025_446_043_828_620_74,
             0.129_234_407_200_302_78,
             0.297_077_424_311_301_4,
             0.5,
@@ -79,13 +79,13 @@ const ALONG: [Rule; 4] = [
             0.064_742_483_084_434_85,
         ],
         coarse: &[
-            0.101_376_934_268_818_99,
+            0.101_376_934_268_819,
             0.025_154_374_211_859_427,
             0.373_468_691_519_321_6,
             0.0,
             0.373_468_691_519_321_6,
             0.025_154_374_211_859_427,
-            0.101_376_934_268_818_99,
+            0.101_376_934_268_819,
         ],
     },
 ];
@@ -98,7 +98,7 @@ const OUTWARDS: [Rule; 3] = [
         coarse: &[0.356_534_333_791_738_3, 0.0, 0.824_384_815_008_518_3],
     },
     Rule {
-        s: &[0.057_104_196_114_517_68, 0.276_843_013_638_123_83, 0.583_590_432_368_916_8, 0.860_240_135_656_219_4],
+        s: &[0.057_104_196_114_517_68, 0.276_843_013_638_123_8, 0.583_590_432_368_916_8, 0.860_240_135_656_219_4],
         weight: &[
             0.143_713_560_791_225_94,
             0.281_356_015_149_462_06,
@@ -515,7 +515,7 @@ impl Workspace {
 }
 
 /// Part of a difference between two rules that stays, where edges of both coats may cross within a piece.
-const CROSSING: f64 = 0.15;
+const CROSSING: f64 = 0.25;
 
 struct Work<'a, 'b> {
     solver: Solver<'a>,
@@ -705,16 +705,16 @@ impl Work<'_, '_> {
             let coats = p.owner != Owner::Pressure && q.owner != Owner::Pressure && p.owner != q.owner;
             coats && (0.02..0.9998).contains(&dot(p.normal, q.normal).abs())
         };
-        let level = if (0..count).any(aslant) { level.max(1) } else { level };
+        let level = if (0..count).any(aslant) { level + 1 } else { level };
         let size = polygon.corners().iter().map(|c| c.at.0.hypot(c.at.1)).fold(0.0, f64::max);
         // Where the strip of the edge before a corner ends, and where that of the edge after it begins: at right angles,
         // as the coat of one skeleton has it; but where edges of two cross, along the other's. Where the pressure ends
         // first, what is left beyond the edge is bounded by the pressure's end.
         let mut rays = [[(0.0, 0.0); 2]; CORNERS];
-        for index in 0..count {
+        for (index, ray) in rays.iter_mut().enumerate().take(count) {
             let (before, after) = (&polygon.corners[(index + count - 1) % count], &polygon.corners[index]);
             let (ahead, back) = ((-before.normal.1, before.normal.0), (after.normal.1, -after.normal.0));
-            rays[index] = match (before.owner, after.owner) {
+            *ray = match (before.owner, after.owner) {
                 (_, Owner::Pressure) => [before.normal, back],
                 (Owner::Pressure, _) => [ahead, after.normal],
                 (p, q) if p != q && dot(before.normal, back) > 0.5 => {
