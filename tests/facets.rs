@@ -71,7 +71,7 @@ fn turned(random: &mut Random, lean: f64, spin: f64) -> isocoat::math::Quat {
     let flat = rotation_from_vector(&Vec3::new(0.0, 0.0, random.range(-spin, spin)));
     // From a hair to the full lean.
     let lean = lean * libm::pow(10.0, random.range(-3.0, 0.0));
-    let angle = random.range(-3.14, 3.14);
+    let angle = random.range(-std::f64::consts::PI, std::f64::consts::PI);
     rotation_from_vector(&Vec3::new(lean * libm::cos(angle), lean * libm::sin(angle), 0.0)) * flat
 }
 
