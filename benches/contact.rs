@@ -17,7 +17,16 @@ fn main() {
     divan::main();
 }
 
-const PAIRS: [&str; 6] = ["ball-ball", "ball-plane", "segment-segment", "box-plane", "box-ball", "dumbbell-dumbbell"];
+const PAIRS: [&str; 8] = [
+    "ball-ball",
+    "ball-plane",
+    "segment-segment",
+    "segment-plane",
+    "box-plane",
+    "box-box",
+    "box-ball",
+    "dumbbell-dumbbell",
+];
 const TOLERANCES: [f64; 3] = [5e-2, 5e-3, 5e-4];
 const SCHEMES: [Scheme; 2] = [Scheme::Polar, Scheme::Auto];
 
@@ -62,6 +71,8 @@ fn scene(pair: &str) -> (World, BodyId, BodyId) {
         "ball-ball" => (0.18, Vec3::new(0.3, -0.2, 0.5)),
         "ball-plane" => (-0.19, Vec3::zeros()),
         "segment-segment" => (0.18, Vec3::new(0.05, 0.03, 0.8)),
+        "segment-plane" => (-0.19, Vec3::new(0.0, 0.01, 0.4)),
+        "box-box" => (0.29, Vec3::new(0.005, -0.01, 0.4)),
         "box-plane" => (-0.245, Vec3::new(0.01, -0.015, 0.4)),
         "box-ball" => (0.235, Vec3::new(0.3, -0.2, 0.5)),
         _ => (0.17, Vec3::new(0.0, 0.0, 0.7)),

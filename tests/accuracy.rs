@@ -89,7 +89,7 @@ fn sweep(scheme: Scheme, tolerance: f64) -> (f64, f64, f64, f64) {
 fn round_pairs_meet_the_tolerance_asked_for() {
     println!("scheme, tolerance: worst error, worst sideways force, share bounded by the estimate, evaluations");
     let mut failures = Vec::new();
-    for scheme in [Scheme::Auto, Scheme::Polar, Scheme::Adaptive] {
+    for scheme in [Scheme::Auto, Scheme::Facets, Scheme::Polar, Scheme::Adaptive] {
         for tolerance in [5e-2, 5e-3, 5e-4, 5e-5] {
             let (worst, sideways, bounded, evaluations) = sweep(scheme, tolerance);
             println!("{scheme:?} {tolerance:.0e}: {worst:.1e} {sideways:.1e} {:.1}% {evaluations:.0}", 100.0 * bounded);
@@ -185,7 +185,7 @@ fn other_pairs_agree_with_brute_force() {
             let finer = oracle.force(140);
             assert!(finer.norm() > 0.0, "{}: no contact", scene.name);
             let doubt = (exact - finer).norm() / finer.norm();
-            for scheme in [Scheme::Auto, Scheme::Polar, Scheme::Adaptive, Scheme::Seeds] {
+            for scheme in [Scheme::Auto, Scheme::Facets, Scheme::Polar, Scheme::Adaptive, Scheme::Seeds] {
                 for tolerance in [5e-2, 5e-3] {
                     let contacts = collide_seeded(a, b, scheme, tolerance, 16384);
                     let error = (total(&contacts) - finer).norm() / finer.norm();

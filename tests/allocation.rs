@@ -116,10 +116,10 @@ fn a_step_of_resting_balls_allocates_nothing() {
 
 #[test]
 fn a_step_of_a_mixed_resting_scene_allocates_nothing() {
-    let counts = [Scheme::Auto, Scheme::Polar, Scheme::Adaptive].map(|scheme| {
+    let counts = [Scheme::Auto, Scheme::Polar, Scheme::Adaptive, Scheme::Facets].map(|scheme| {
         let count = allocations(resting_scene(scheme, false), 9);
         println!("{scheme:?}: {count} allocations in 60 steps");
         count
     });
-    assert_eq!(counts, [0; 3]);
+    assert_eq!(counts, [0; 4]);
 }

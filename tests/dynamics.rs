@@ -206,7 +206,7 @@ fn a_fast_ball_does_not_tunnel_and_weak_barriers_push_it_out() {
 
 #[test]
 fn a_ball_rolling_on_a_frictionless_plane_never_starts_to_spin() {
-    for scheme in [Scheme::Auto, Scheme::Polar, Scheme::Adaptive, Scheme::Seeds] {
+    for scheme in [Scheme::Auto, Scheme::Facets, Scheme::Polar, Scheme::Adaptive, Scheme::Seeds] {
         let gravity = Vec3::new(0.0, 0.0, -G);
         let mut world = World::new(WorldDesc { gravity, scheme, ..WorldDesc::default() }).unwrap();
         add_floor(&mut world, BodyDesc::default());

@@ -14,7 +14,7 @@ use isocoat::world::{
 };
 
 const DT: f64 = 1.0 / 60.0;
-const SCHEMES: [Scheme; 4] = [Scheme::Auto, Scheme::Polar, Scheme::Adaptive, Scheme::Seeds];
+const SCHEMES: [Scheme; 5] = [Scheme::Auto, Scheme::Polar, Scheme::Adaptive, Scheme::Seeds, Scheme::Facets];
 
 /// A body of one link or, for `split`, of a link for each of its two primitives, which blend.
 struct Solid {

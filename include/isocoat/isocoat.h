@@ -267,6 +267,8 @@ typedef uint32_t isocoat_scheme;
 #define ISOCOAT_SCHEME_ADAPTIVE 3u
 /** Seeds on the surfaces, as in the papers. */
 #define ISOCOAT_SCHEME_SEEDS 4u
+/** Flat faces and straight edges, with their rounded surroundings; pairs without them as ISOCOAT_SCHEME_AUTO. */
+#define ISOCOAT_SCHEME_FACETS 5u
 
 /** Settings of a world. Begin with isocoat_world_desc_default(). */
 typedef struct isocoat_world_desc {

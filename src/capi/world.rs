@@ -36,6 +36,8 @@ pub const ISOCOAT_SCHEME_POLAR: isocoat_scheme = 2;
 pub const ISOCOAT_SCHEME_ADAPTIVE: isocoat_scheme = 3;
 /// Seeds on the surfaces, as in the papers.
 pub const ISOCOAT_SCHEME_SEEDS: isocoat_scheme = 4;
+/// Flat faces and straight edges, with their rounded surroundings; pairs without them as ISOCOAT_SCHEME_AUTO.
+pub const ISOCOAT_SCHEME_FACETS: isocoat_scheme = 5;
 
 /// How much a message matters: an ISOCOAT_LOG_ value. More may come.
 pub type isocoat_log_level = u32;
@@ -149,6 +151,7 @@ pub(super) fn scheme_to_c(scheme: Scheme) -> isocoat_scheme {
         Scheme::Polar => ISOCOAT_SCHEME_POLAR,
         Scheme::Adaptive => ISOCOAT_SCHEME_ADAPTIVE,
         Scheme::Seeds => ISOCOAT_SCHEME_SEEDS,
+        Scheme::Facets => ISOCOAT_SCHEME_FACETS,
     }
 }
 
@@ -159,7 +162,8 @@ pub(super) fn scheme_from_c(scheme: isocoat_scheme) -> Checked<Scheme> {
         ISOCOAT_SCHEME_POLAR => Scheme::Polar,
         ISOCOAT_SCHEME_ADAPTIVE => Scheme::Adaptive,
         ISOCOAT_SCHEME_SEEDS => Scheme::Seeds,
-        other => return Err(unknown("scheme", other, "ISOCOAT_SCHEME_", 4)),
+        ISOCOAT_SCHEME_FACETS => Scheme::Facets,
+        other => return Err(unknown("scheme", other, "ISOCOAT_SCHEME_", 5)),
     })
 }
 

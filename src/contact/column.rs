@@ -223,15 +223,28 @@ impl Solver<'_> {
         Some(Look::Refitted)
     }
 
-    /// The border along a direction of the frame: its radius and height. Newton on `Φ = σ = 0` in the half-plane, kept
-    /// between a point inside the contact and, once seen, one outside.
-    pub fn border(&mut self, (dx, dy): (f64, f64), peak: f64, guess: f64) -> Option<(f64, f64)> {
+    /// The border along a direction of the frame: its radius and height.
+    pub fn border(&mut self, direction: (f64, f64), peak: f64, guess: f64) -> Option<(f64, f64)> {
+        self.border_from((0.0, 0.0, 0.0), direction, peak, guess)
+    }
+
+    /// The border along a direction from a place `(x, y, height)` in the contact: its distance, near 1 if the direction
+    /// is as long as expected, and its height. Newton on `Φ = σ = 0` in the half-plane, kept between a point inside the
+    /// contact and, once seen, one outside.
+    pub fn border_from(
+        &mut self,
+        (x, y, height): (f64, f64, f64),
+        (dx, dy): (f64, f64),
+        peak: f64,
+        guess: f64,
+    ) -> Option<(f64, f64)> {
         let frame = self.frame;
+        let foot = frame.point(x, y, 0.0);
         let along = frame.u * (dx * frame.scale[0]) + frame.v * (dy * frame.scale[1]);
-        let (mut inside, mut height_inside, mut outside) = (0.0, 0.0, f64::INFINITY);
+        let (mut inside, mut height_inside, mut outside) = (0.0, height, f64::INFINITY);
         let (mut s, mut z, mut climbs) = (1.0, guess, 0);
         for _ in 0..80 {
-            let sample = self.pair.sample(&(frame.origin + along * s + frame.normal * z));
+            let sample = self.pair.sample(&(foot + along * s + frame.normal * z));
             self.evaluations += 1;
             let (phi_s, phi_z) =
                 (sample.difference_gradient.dot(&along), sample.difference_gradient.dot(&frame.normal));

@@ -1,7 +1,7 @@
 //! Contact: where two coats meet, and with what pressure.
 //!
-//! [`pair`] puts two coats into one frame; [`deepest`] finds where they meet; [`closed_form`], [`polar`], [`adaptive`]
-//! and [`seeds`] integrate the surface, each in its own way, and [`surface`] chooses among them.
+//! [`pair`] puts two coats into one frame; [`deepest`] finds where they meet; [`closed_form`], [`facets`], [`polar`],
+//! [`adaptive`] and [`seeds`] integrate the surface, each in its own way, and [`surface`] chooses among them.
 
 pub mod adaptive;
 pub mod broad_phase;
@@ -9,6 +9,7 @@ pub mod candidate;
 pub mod closed_form;
 pub mod column;
 pub mod deepest;
+pub mod facets;
 pub mod friction;
 pub mod overload;
 pub mod pair;
@@ -33,4 +34,6 @@ pub enum Scheme {
     Adaptive,
     /// Energy-consistent seeds, the papers' sampling.
     Seeds,
+    /// Flat faces and straight edges with their strips and fans; pairs without them as [`Scheme::Auto`].
+    Facets,
 }

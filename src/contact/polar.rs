@@ -13,15 +13,15 @@ use crate::math::Vec3;
 
 /// A rule for `∫₀¹ f(s) s ds` with `f(1) = 0`, exact to degree `2 n`; and a coarser one on the same points and the
 /// centre, whose difference estimates the error.
-struct Rule {
-    s: &'static [f64],
-    weight: &'static [f64],
-    coarse: &'static [f64],
-    center: f64,
+pub(super) struct Rule {
+    pub s: &'static [f64],
+    pub weight: &'static [f64],
+    pub coarse: &'static [f64],
+    pub center: f64,
 }
 
 /// Interior Gauss-Lobatto points; weights solved for from the moments of `s`.
-const RULES: [Rule; 6] = [
+pub(super) const RULES: [Rule; 6] = [
     Rule {
         s: &[0.276_393_202_250_021, 0.723_606_797_749_978_9],
         weight: &[0.115_163_834_270_842_1, 0.301_502_832_395_824_6],
@@ -129,7 +129,7 @@ const RULES: [Rule; 6] = [
 const LEVELS: [(usize, usize); 9] = [(6, 0), (8, 0), (12, 1), (16, 2), (24, 3), (32, 3), (48, 4), (64, 5), (128, 5)];
 
 /// Part of the tolerance that the roots may use up.
-const SOLVING: f64 = 0.2;
+pub(super) const SOLVING: f64 = 0.2;
 
 /// A patch that was integrated.
 pub struct Integrated {

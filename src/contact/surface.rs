@@ -8,7 +8,7 @@ use super::deepest::{self, Approach, Deepest};
 use super::overload::is_overloaded;
 use super::pair::{Pair, Side};
 use super::patch::{self, Node, Patch};
-use super::{adaptive, polar, seeds};
+use super::{adaptive, facets, polar, seeds};
 use crate::field::Shape;
 use crate::math::Vec3;
 
@@ -36,7 +36,9 @@ pub struct Surface {
     covered: Vec<Covered>,
     borders: Vec<f64>,
     cells: Vec<(i32, i32)>,
+    outlines: Vec<(f64, f64)>,
     workspace: adaptive::Workspace,
+    pieces: facets::Workspace,
 }
 
 /// A region of the surface that a patch already accounts for.
@@ -46,6 +48,8 @@ enum Covered {
     Polar(Frame, (usize, usize)),
     /// Within cells of the first grid, in order: a range of `cells`.
     Cells(Frame, (usize, usize)),
+    /// Within a polygon, counter-clockwise: a range of `outlines`.
+    Outline(Frame, (usize, usize)),
 }
 
 /// Finds and integrates the contact surface of a pair.
@@ -57,6 +61,7 @@ pub fn integrate(pair: &Pair, settings: &Settings, out: &mut Surface) {
     out.covered.clear();
     out.borders.clear();
     out.cells.clear();
+    out.outlines.clear();
     out.evaluations = 0;
     for i in 0..pair.a.skeletons.len() {
         for j in 0..pair.b.skeletons.len() {
@@ -107,7 +112,7 @@ impl Surface {
 
     /// Whether a point of the surface lies within a region.
     fn contains(&self, region: &Covered, p: &Vec3) -> bool {
-        let (Covered::Polar(frame, range) | Covered::Cells(frame, range)) = region;
+        let (Covered::Polar(frame, range) | Covered::Cells(frame, range) | Covered::Outline(frame, range)) = region;
         let (x, y, height) = frame.coordinates(p);
         let size = frame.scale[0].max(frame.scale[1]);
         match region {
@@ -124,6 +129,18 @@ impl Surface {
                 let cells = &self.cells[range.0..range.1];
                 let reach = cells.iter().map(|(i, j)| i.abs().max(j.abs())).max().unwrap_or(0);
                 cells.binary_search(&adaptive::grid_cell(x, y)).is_ok() && height.abs() < size * f64::from(reach + 1)
+            }
+            Covered::Outline(..) => {
+                let outline = &self.outlines[range.0..range.1];
+                let reach = outline.iter().map(|(x, y)| x.hypot(*y)).fold(0.0, f64::max);
+                // The border was found at some places only, and between them it bulges.
+                let margin = 0.02 * reach;
+                let behind = |index: usize| {
+                    let (p, q) = (outline[index], outline[(index + 1) % outline.len()]);
+                    let along = (q.0 - p.0, q.1 - p.1);
+                    along.0 * (y - p.1) - along.1 * (x - p.0) >= -margin * along.0.hypot(along.1)
+                };
+                (0..outline.len()).all(behind) && height.abs() < reach
             }
         }
     }
@@ -157,15 +174,26 @@ fn patch(pair: &Pair, settings: &Settings, at: &Deepest, extent: f64, out: &mut 
     let first = out.nodes.len();
     let (first_border, first_cell) = (out.borders.len(), out.cells.len());
     let mut spent = 0;
+    if matches!(settings.scheme, Scheme::Auto | Scheme::ClosedForm | Scheme::Facets) {
+        let first_corner = out.outlines.len();
+        match facets::integrate(pair, at, settings.tolerance, &mut out.pieces, &mut out.nodes, &mut out.outlines) {
+            Ok(done) => {
+                out.push(at, first, pair.scale, done.error, done.evaluations, Scheme::Facets);
+                out.covered.push(Covered::Outline(done.frame, (first_corner, out.outlines.len())));
+                return true;
+            }
+            Err(facets::NoFacets { evaluations }) => spent = evaluations,
+        }
+    }
     if settings.scheme != Scheme::Adaptive {
         let forced = settings.scheme == Scheme::Polar;
         match polar::integrate(pair, at, extent, settings.tolerance, forced, &mut out.nodes, &mut out.borders) {
             Ok(done) => {
-                out.push(at, first, pair.scale, done.error, done.evaluations, Scheme::Polar);
+                out.push(at, first, pair.scale, done.error, done.evaluations + spent, Scheme::Polar);
                 out.covered.push(Covered::Polar(done.frame, (first_border, out.borders.len())));
                 return true;
             }
-            Err(polar::NotStarShaped { evaluations }) => spent = evaluations,
+            Err(polar::NotStarShaped { evaluations }) => spent += evaluations,
         }
     }
     match adaptive::integrate(pair, at, extent, settings.tolerance, &mut out.workspace, &mut out.nodes, &mut out.cells)

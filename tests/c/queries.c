@@ -64,7 +64,10 @@ static void the_contact_of_two_balls(void)
     CHECK(count == 1);
     count = 99;
     memset(&contact, 0, sizeof contact);
-    for (scheme = ISOCOAT_SCHEME_AUTO; scheme <= ISOCOAT_SCHEME_ADAPTIVE; ++scheme) {
+    for (scheme = ISOCOAT_SCHEME_AUTO; scheme <= ISOCOAT_SCHEME_FACETS; ++scheme) {
+        if (scheme == ISOCOAT_SCHEME_SEEDS) {
+            continue;
+        }
         OK(isocoat_world_collide(world, a.body, b.body, scheme, 1e-6, &contact, 1, &count));
         CHECK(count == 1 && same_body(contact.body_a, a.body) && same_body(contact.body_b, b.body));
         CHECK(same_link(contact.link_b, b.link) && same_skeleton(contact.skeleton_a, a.skeleton));
@@ -80,7 +83,7 @@ static void the_contact_of_two_balls(void)
     CHECK(count == 0);
 
     count = 99;
-    REFUSED(isocoat_world_collide(world, a.body, b.body, 5, 1e-6, &contact, 1, &count), argument, "scheme is 5");
+    REFUSED(isocoat_world_collide(world, a.body, b.body, 6, 1e-6, &contact, 1, &count), argument, "scheme is 6");
     REFUSED(isocoat_world_collide(world, a.body, b.body, 0, 0.0, &contact, 1, &count), range,
             "tolerance is 0; must be from 1e-9 to 0.5");
     REFUSED(isocoat_world_collide(world, a.body, b.body, 0, NAN, &contact, 1, &count), range, "tolerance is NaN");

@@ -25,7 +25,7 @@ static void worlds(void)
     isocoat_world *world = new_world();
 
     WORLD(response, 4, argument, "response is 4; must be one of ISOCOAT_RESPONSE_*, 0 to 3");
-    WORLD(scheme, 5, argument, "scheme is 5; must be one of ISOCOAT_SCHEME_*, 0 to 4");
+    WORLD(scheme, 6, argument, "scheme is 6; must be one of ISOCOAT_SCHEME_*, 0 to 5");
     WORLD(seed_count, 3, range, "seed_count is 3; must be from 4 to 65536");
     WORLD(seed_count, 65537, range, "seed_count is 65537");
     WORLD(max_substeps, 0, range, "max_substeps is 0; must be from 1 to 65536");
