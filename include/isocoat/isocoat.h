@@ -649,7 +649,10 @@ typedef uint32_t isocoat_link_flags;
 
 /** The host itself applies the gyroscopic torque. */
 #define ISOCOAT_LINK_HOST_GYROSCOPIC 1u
-/** Joints or contacts of the host act on the link in this tick. */
+/**
+ * Joints or contacts of the host act on the link in this tick, so that it does not move as its own mass would. The
+ * automatic response is implicit then; without inverse_effective_inertia, what holds it is estimated.
+ */
 #define ISOCOAT_LINK_CONSTRAINED 2u
 /** The field inverse_effective_inertia is given. */
 #define ISOCOAT_LINK_HAS_INVERSE_EFFECTIVE_INERTIA 4u
@@ -1152,6 +1155,21 @@ ISOCOAT_MUST_USE
 isocoat_status isocoat_link_apply_angular_impulse(isocoat_world *world,
                                                   isocoat_link link,
                                                   const double impulse[3]);
+
+/**
+ * Says whether joints or contacts of its host's own act on a host-driven link in this tick: the flag
+ * ISOCOAT_LINK_CONSTRAINED, cheap enough for every tick. Does nothing to links of other kinds.
+ *
+ * - world: not NULL.
+ * - link: the link.
+ * - constrained: 0 for no, anything else for yes.
+ *
+ * Errors: INVALID_HANDLE. Threads: changes the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_link_set_constrained(isocoat_world *world,
+                                            isocoat_link link,
+                                            uint32_t constrained);
 
 /**
  * Sets the accelerations of a link besides gravity and contact, until they are set again: for a host-driven link, what

@@ -247,6 +247,9 @@ public:
     {
         check(isocoat_link_apply_angular_impulse(world_, raw_, impulse.data()));
     }
+    void set_constrained(bool constrained) {
+        check(isocoat_link_set_constrained(world_, raw_, constrained ? 1 : 0));
+    }
     void set_external_acceleration(const vec3 &linear, const vec3 &angular)
     {
         check(isocoat_link_set_external_acceleration(world_, raw_, linear.data(), angular.data()));

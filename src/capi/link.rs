@@ -37,7 +37,8 @@ pub const ISOCOAT_VELOCITY_SYNCHRONOUS: isocoat_velocity_convention = 1;
 pub type isocoat_link_flags = u32;
 /// The host itself applies the gyroscopic torque.
 pub const ISOCOAT_LINK_HOST_GYROSCOPIC: isocoat_link_flags = 1;
-/// Joints or contacts of the host act on the link in this tick.
+/// Joints or contacts of the host act on the link in this tick, so that it does not move as its own mass would. The
+/// automatic response is implicit then; without inverse_effective_inertia, what holds it is estimated.
 pub const ISOCOAT_LINK_CONSTRAINED: isocoat_link_flags = 2;
 /// The field inverse_effective_inertia is given.
 pub const ISOCOAT_LINK_HAS_INVERSE_EFFECTIVE_INERTIA: isocoat_link_flags = 4;

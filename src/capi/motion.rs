@@ -266,6 +266,25 @@ pub unsafe extern "C" fn isocoat_link_apply_angular_impulse(
     }
 }
 
+/// Says whether joints or contacts of its host's own act on a host-driven link in this tick: the flag
+/// ISOCOAT_LINK_CONSTRAINED, cheap enough for every tick. Does nothing to links of other kinds.
+///
+/// - world: not NULL.
+/// - link: the link.
+/// - constrained: 0 for no, anything else for yes.
+///
+/// Errors: INVALID_HANDLE. Threads: changes the world.
+#[must_use]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn isocoat_link_set_constrained(
+    world: *mut isocoat_world,
+    link: isocoat_link,
+    constrained: u32,
+) -> isocoat_status {
+    // SAFETY: NULL or a live world.
+    unsafe { write(world, |inner| Ok(inner.world.set_constrained(link.into(), constrained != 0)?)) }
+}
+
 /// Sets the accelerations of a link besides gravity and contact, until they are set again: for a host-driven link, what
 /// the host adds by itself in a tick besides gravity_scale times the world's gravity.
 ///

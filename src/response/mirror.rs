@@ -42,8 +42,8 @@ pub struct Mirror {
 /// Part of the commanded change of velocity by which a free host may be off.
 const OFF: f64 = 0.25;
 
-/// Part of a host's speed that its rounding may take.
-const ROUNDING: f64 = 1e-3;
+/// Part of the jump that counts as a teleport by which a free host may be off in a step: it rounds, or wakes up.
+const NOTHING: f64 = 2e-3;
 
 /// Part of what a held host was off that goes into the estimate of its other accelerations. Stable while the host's
 /// effective mass is at most ten times the link's (docs/model.md, "Held hosts").
@@ -78,9 +78,7 @@ impl Mirror {
                 linear: host.twist.linear - self.expected_twist.linear,
                 angular: host.twist.angular - self.expected_twist.angular,
             };
-            // A host that computes with fewer digits is off by its rounding.
-            let rounding = ROUNDING * (host.twist.linear.norm() + motion.acceleration.norm() * dt);
-            if off.linear.norm() > OFF * self.commanded + rounding {
+            if off.linear.norm() > OFF * self.commanded + NOTHING * host.teleport / dt {
                 self.doubt = DOUBT;
             }
             Twist { linear: self.twist.linear + off.linear, angular: self.twist.angular + off.angular }

@@ -462,6 +462,12 @@ impl World {
         Ok(())
     }
 
+    /// Says whether joints or contacts of its host's own act on a host-driven link in this tick.
+    pub fn set_constrained(&mut self, id: LinkId, constrained: bool) -> Result<()> {
+        self.links.get_mut(id)?.desc.constrained = constrained;
+        Ok(())
+    }
+
     /// Sets the accelerations of a link besides gravity and contact \[m/s², rad/s²\]: for hosts that say every tick what
     /// they will do.
     pub fn set_external_acceleration(&mut self, id: LinkId, linear: &Vec3, angular: &Vec3) -> Result<()> {

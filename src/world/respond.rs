@@ -130,9 +130,9 @@ impl World {
             {
                 let host = self.host(&self.links[slot]);
                 let link = &mut self.links[slot];
-                // With the effective inertia, the host's own answer is known.
+                // With the effective inertia, the host's own answer is known; unless it turns out to be off.
                 let known = link.desc.inverse_effective_inertia.is_some();
-                let held = !known && (link.desc.constrained || link.mirror.is_doubtful());
+                let held = link.desc.constrained && !known || link.mirror.is_doubtful();
                 link.mirror.bypass(&host, &mut state.motions[slot], held, dt);
             }
         }

@@ -216,6 +216,7 @@ static void bad_link(isocoat_world *world, isocoat_link link, const char *why)
     REFUSED(isocoat_link_apply_impulse(world, link, v, v), bad, why);
     REFUSED(isocoat_link_apply_angular_impulse(world, link, v), bad, why);
     REFUSED(isocoat_link_set_external_acceleration(world, link, v, v), bad, why);
+    REFUSED(isocoat_link_set_constrained(world, link, 1), bad, why);
     REFUSED(isocoat_world_set_link_states(world, &link, &state, 1), bad, "links[0]: link: ");
     REFUSED(isocoat_world_get_link_states(world, &link, 1, none, none), bad, why);
     REFUSED(isocoat_world_get_link_wrenches(world, &link, 1, none, none), bad, why);

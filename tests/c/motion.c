@@ -33,6 +33,8 @@ static void a_free_link_falls_and_is_pushed(void)
 
     /* Forces and impulses last one step; an external acceleration lasts. */
     OK(isocoat_link_set_external_acceleration(world, link, up, none));
+    OK(isocoat_link_set_constrained(world, link, 1));
+    OK(isocoat_link_set_constrained(world, link, 0));
     OK(isocoat_world_step(world, dt));
     OK(isocoat_world_step(world, dt));
     OK(isocoat_link_get_state(world, link, &state));

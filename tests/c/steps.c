@@ -154,6 +154,7 @@ static void everything_is_locked(filter_calls *all)
     REFUSED(isocoat_link_apply_impulse(world, b.link, v, NULL), locked, why);
     REFUSED(isocoat_link_apply_angular_impulse(world, b.link, v), locked, why);
     REFUSED(isocoat_link_set_external_acceleration(world, b.link, v, v), locked, why);
+    REFUSED(isocoat_link_set_constrained(world, b.link, 1), locked, why);
     REFUSED(isocoat_skeleton_create(world, b.link, &skeleton_desc, &b.skeleton), locked, why);
     REFUSED(isocoat_skeleton_destroy(world, b.skeleton), locked, why);
     REFUSED(isocoat_skeleton_get_desc(world, b.skeleton, &skeleton_desc), locked, why);
