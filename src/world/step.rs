@@ -4,7 +4,7 @@ use super::events::{Contact, Counters, Event, EventKind, LogLevel};
 use super::{BodyId, Link, World, units};
 use crate::base::{Kind, Motion};
 use crate::contact::broad_phase::{self, Bounds};
-use crate::contact::candidate::Candidate;
+use crate::contact::candidate::{Candidate, Memory};
 use crate::contact::{pair::Side, surface};
 use crate::error::{Result, require};
 use crate::math::Wrench;
@@ -52,6 +52,46 @@ impl Stepping {
 
     pub fn counters(&self) -> Counters {
         self.counters
+    }
+
+    /// What a snapshot keeps. The rest are buffers and reports; whoever adds a field decides here.
+    pub fn lasting(&self) -> &[Candidate] {
+        let Self {
+            candidates,
+            motions: _,
+            responses: _,
+            bounds: _,
+            bounds_of: _,
+            pairs: _,
+            previous: _,
+            spare: _,
+            islands: _,
+            island_count: _,
+            roots: _,
+            island_of: _,
+            touches: _,
+            rates: _,
+            work: _,
+            implicit: _,
+            contacts: _,
+            events: _,
+            counters: _,
+        } = self;
+        candidates
+    }
+
+    /// Goes on from what a snapshot has kept, in the buffers that are there. Nothing is reported until the next step.
+    pub fn restart(&mut self, memories: Vec<Memory>) {
+        self.spare.append(&mut self.candidates);
+        for memory in memories {
+            let mut candidate = self.spare.pop().unwrap_or_default();
+            candidate.bodies = memory.ids.map(|id| id.index);
+            candidate.memory = memory;
+            self.candidates.push(candidate);
+        }
+        self.contacts.clear();
+        self.events.clear();
+        self.counters = Counters::default();
     }
 
     /// What the contacts of a body went through no longer counts: it was put elsewhere.
