@@ -206,6 +206,7 @@ fn scenes() -> Vec<(&'static str, World)> {
     vec![
         ("bouncing", bouncing(Response::Substepped)),
         ("bouncing, explicit", bouncing(Response::Explicit)),
+        ("bouncing, implicit", bouncing(Response::Implicit)),
         ("pile", pile(Scheme::Auto)),
         ("pile of seeds", pile(Scheme::Seeds)),
         ("pile of facets", pile(Scheme::Facets)),
@@ -231,20 +232,20 @@ fn a_restored_world_goes_on_bit_for_bit() {
                 let _ = world.apply_angular_impulse(*link, &Vec3::new(0.0, 0.0, 1e-3));
             }
             let bytes = taken(&world);
-            let expected = run(&mut world, &host, stop..stop + 20);
+            let expected = run(&mut world, &host, stop..stop + 12);
             touched |= !world.contacts().is_empty();
 
             world.restore(&bytes).unwrap();
             assert!(world.contacts().is_empty() && world.events().is_empty());
             assert!(taken(&world) == bytes, "{name}: a snapshot of the restored world is the same");
-            assert!(run(&mut world, &host, stop..stop + 20) == expected, "{name}: the same world after {stop} steps");
+            assert!(run(&mut world, &host, stop..stop + 12) == expected, "{name}: the same world after {stop} steps");
 
             for mut fresh in
                 [World::new(WorldDesc::default()).unwrap(), std::mem::replace(&mut other, pile(Scheme::Polar))]
             {
                 fresh.restore(&bytes).unwrap();
                 let host = Host::of(&fresh);
-                let found = run(&mut fresh, &host, stop..stop + 20);
+                let found = run(&mut fresh, &host, stop..stop + 12);
                 assert!(found == expected, "{name}: another world after {stop} steps");
             }
             world.restore(&start).unwrap();
@@ -354,6 +355,14 @@ fn small() -> (World, Host, Vec<u8>, Vec<u64>) {
     let expected = run(&mut world, &host, 3..6);
     world.restore(&bytes).unwrap();
     (world, host, bytes, expected)
+}
+
+/// A field more or less, and old snapshots would be misread: the change needs a new number of the format.
+#[test]
+fn the_format_has_a_new_number_when_it_changes() {
+    let (_, _, bytes, _) = small();
+    let format = u32::from_le_bytes(bytes[8..12].try_into().unwrap());
+    assert_eq!((format, bytes.len()), (1, 1840), "the lists of src/world/snapshot.rs have changed: raise FORMAT there");
 }
 
 fn reason(world: &mut World, bytes: &[u8]) -> String {
@@ -491,7 +500,7 @@ fn what_is_let_in_is_a_world() {
             let again = taken(&world);
             world.restore(&again).unwrap();
             assert!(taken(&world) == again);
-            if let_in % 50 == 0 {
+            if let_in % 200 == 0 {
                 let calm = WorldDesc { max_substeps: 4, ..world.desc().clone() };
                 world.set_desc(calm).unwrap();
                 world.step(DT).unwrap();

@@ -57,6 +57,12 @@ impl<'a> Reader<'a> {
         self.bytes.len() - self.at
     }
 
+    /// How many of `count` values to make room for at once. A count that lies runs into the end of the bytes, not of
+    /// the memory.
+    pub fn room_for<T>(&self, count: u32) -> usize {
+        (count as usize).min(self.left() / size_of::<T>().max(1))
+    }
+
     /// Reads a value that messages call `field`.
     pub fn read<T: Lasting>(&mut self, field: &'static str) -> Result<T> {
         self.field = field;
@@ -187,8 +193,7 @@ impl<T: Lasting> Lasting for Vec<T> {
     }
     fn read(from: &mut Reader) -> Result<Self> {
         let count = u32::read(from)?;
-        // A count that lies runs into the end of the bytes, not of the memory.
-        let mut list = Vec::with_capacity((count as usize).min(from.left() / size_of::<T>().max(1)));
+        let mut list = Vec::with_capacity(from.room_for::<T>(count));
         for _ in 0..count {
             list.push(T::read(from)?);
         }

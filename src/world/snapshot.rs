@@ -187,7 +187,8 @@ fn write_arena<T: Noun + Lasting>(arena: &Arena<T>, out: &mut impl Sink) {
 
 fn read_arena<T: Noun + Lasting>(from: &mut Reader) -> Result<Arena<T>> {
     let count: u32 = from.read("number of slots")?;
-    let (mut slots, mut given) = (Vec::new(), Vec::new());
+    let room = from.room_for::<Slot<T>>(count);
+    let (mut slots, mut given) = (Vec::with_capacity(room), Vec::with_capacity(room));
     for _ in 0..count {
         given.push(from.read("last generation of a slot")?);
         let generation = from.read("generation of a slot")?;

@@ -82,12 +82,14 @@ impl Stepping {
 
     /// Goes on from what a snapshot has kept, in the buffers that are there. Nothing is reported until the next step.
     pub fn restart(&mut self, memories: Vec<Memory>) {
-        self.spare.append(&mut self.candidates);
-        for memory in memories {
-            let mut candidate = self.spare.pop().unwrap_or_default();
+        // Whose buffers a candidate has does not matter: those that stay where they are need not be moved.
+        while self.candidates.len() < memories.len() {
+            self.candidates.push(self.spare.pop().unwrap_or_default());
+        }
+        self.spare.extend(self.candidates.drain(memories.len()..));
+        for (candidate, memory) in self.candidates.iter_mut().zip(memories) {
             candidate.bodies = memory.ids.map(|id| id.index);
             candidate.memory = memory;
-            self.candidates.push(candidate);
         }
         self.contacts.clear();
         self.events.clear();
