@@ -28,6 +28,9 @@ pub enum Error {
     /// A limit of the library is reached, such as the number of live handles.
     #[error("{0}")]
     Capacity(&'static str),
+    /// Bytes are not a snapshot that this library can restore: damaged, cut short, or of another format.
+    #[error("the snapshot is refused: {0}")]
+    Snapshot(String),
 }
 
 /// Shorthand used throughout the library.

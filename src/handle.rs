@@ -2,7 +2,7 @@
 
 use std::marker::PhantomData;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, out_of_range};
 
 /// An id: slot, generation of the slot, and tag of the world. The all-zero id is null.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -79,22 +79,60 @@ impl<T> std::fmt::Debug for Id<T> {
     }
 }
 
-struct Slot<T> {
-    generation: u16,
-    value: Option<T>,
+/// A place for an object.
+pub(crate) struct Slot<T> {
+    /// That of the object in it, or of the last one.
+    pub generation: u16,
+    pub value: Option<T>,
 }
 
 /// The slot table of one noun.
 pub(crate) struct Arena<T> {
     world: u16,
     slots: Vec<Slot<T>>,
+    /// Empty slots; the last is used next.
     free: Vec<u32>,
     live: usize,
+    /// The last generation that each slot has ever given out: as many as slots, or more after a rollback. It is never
+    /// taken back, so that a handle from a future that did not come to pass never fits another object.
+    given: Vec<u16>,
 }
 
 impl<T: Noun> Arena<T> {
     pub fn new(world: u16) -> Self {
-        Self { world, slots: Vec::new(), free: Vec::new(), live: 0 }
+        Self { world, slots: Vec::new(), free: Vec::new(), live: 0, given: Vec::new() }
+    }
+
+    /// The arena of slots and a free list from outside, or why they make none. `given` is as long as `slots`.
+    pub fn from_parts(world: u16, slots: Vec<Slot<T>>, free: Vec<u32>, given: Vec<u16>) -> Result<Self> {
+        let live = slots.iter().filter(|slot| slot.value.is_some()).count();
+        for (slot, given) in slots.iter().zip(&given) {
+            if slot.value.is_some() && !(1..=*given).contains(&slot.generation) {
+                return Err(out_of_range("generation of a slot", slot.generation, "from 1 to the last given out"));
+            }
+        }
+        let mut is_free = vec![false; slots.len()];
+        for index in &free {
+            match (slots.get(*index as usize), is_free.get_mut(*index as usize)) {
+                (Some(Slot { value: None, .. }), Some(listed)) if !*listed => *listed = true,
+                _ => return Err(out_of_range("free slot", index, "the number of an empty slot, each once")),
+            }
+        }
+        Ok(Self { world, slots, free, live, given })
+    }
+
+    /// The slots, the free list, and the last generations given out by these slots.
+    pub fn parts(&self) -> (&[Slot<T>], &[u32], &[u16]) {
+        let Self { world: _, slots, free, live: _, given } = self;
+        (slots, free, &given[..slots.len()])
+    }
+
+    /// Takes care that no generation is given out that another arena of the same world has given out already.
+    pub fn go_on_from(&mut self, other: &Self) {
+        self.given.resize(self.given.len().max(other.given.len()), 0);
+        for (given, other) in self.given.iter_mut().zip(&other.given) {
+            *given = (*given).max(*other);
+        }
     }
 
     pub fn len(&self) -> usize {
@@ -102,31 +140,39 @@ impl<T: Noun> Arena<T> {
     }
 
     pub fn insert(&mut self, value: T) -> Result<Id<T>> {
-        let index = match self.free.pop() {
-            Some(index) => index,
-            None => {
-                let index = u32::try_from(self.slots.len())
-                    .map_err(|_| Error::Capacity("too many objects: a world holds at most 2^32 of a kind"))?;
-                self.slots.push(Slot { generation: 1, value: None });
-                index
-            }
-        };
-        let slot = &mut self.slots[index as usize];
-        slot.value = Some(value);
+        let index = self.empty_slot()?;
+        let (slot, given) = (&mut self.slots[index as usize], &mut self.given[index as usize]);
+        *given += 1;
+        *slot = Slot { generation: *given, value: Some(value) };
         self.live += 1;
-        Ok(Id::from_raw(RawId { index, generation: slot.generation, world: self.world }))
+        Ok(Id::from_raw(RawId { index, generation: *given, world: self.world }))
+    }
+
+    /// An empty slot that has generations left. One whose generations are used up is retired, so that no stale handle
+    /// ever fits again.
+    fn empty_slot(&mut self) -> Result<u32> {
+        loop {
+            let index = match self.free.pop() {
+                Some(index) => index,
+                None => {
+                    let index = u32::try_from(self.slots.len())
+                        .map_err(|_| Error::Capacity("too many objects: a world holds at most 2^32 of a kind"))?;
+                    self.slots.push(Slot { generation: 0, value: None });
+                    self.given.resize(self.given.len().max(self.slots.len()), 0);
+                    index
+                }
+            };
+            if self.given[index as usize] < u16::MAX {
+                return Ok(index);
+            }
+        }
     }
 
     pub fn remove(&mut self, id: Id<T>) -> Result<T> {
         self.check(id)?;
-        let slot = &mut self.slots[id.index()];
         self.live -= 1;
-        // A slot whose generations are used up is retired, so that no stale handle ever fits again.
-        if slot.generation < u16::MAX {
-            slot.generation += 1;
-            self.free.push(id.raw.index);
-        }
-        slot.value.take().ok_or(Error::InvalidHandle { noun: T::NAME, reason: "it was destroyed" })
+        self.free.push(id.raw.index);
+        self.slots[id.index()].value.take().ok_or(Error::InvalidHandle { noun: T::NAME, reason: "it was destroyed" })
     }
 
     pub fn get(&self, id: Id<T>) -> Result<&T> {
@@ -137,6 +183,21 @@ impl<T: Noun> Arena<T> {
     pub fn get_mut(&mut self, id: Id<T>) -> Result<&mut T> {
         self.check(id)?;
         Ok(&mut self[id.index()])
+    }
+
+    /// The tag of the world.
+    pub fn world(&self) -> u16 {
+        self.world
+    }
+
+    /// Gives the objects to a world: handles with its tag now stand for them, others no longer do.
+    pub fn set_world(&mut self, world: u16) {
+        self.world = world;
+    }
+
+    /// The object in a slot, if there is one.
+    pub fn at_mut(&mut self, index: usize) -> Option<&mut T> {
+        self.slots.get_mut(index).and_then(|slot| slot.value.as_mut())
     }
 
     /// The id of the object in a slot that is known to be live.
@@ -225,5 +286,31 @@ mod tests {
         }
         assert_eq!(arena.insert(0).unwrap().raw.index, 1);
         assert!(arena.get(first).is_err());
+    }
+
+    #[test]
+    fn a_handle_from_before_a_rollback_never_means_another_object() {
+        let mut before = Arena::<u8>::new(1);
+        let kept = before.insert(0).unwrap();
+        let gone = before.insert(1).unwrap();
+        let copy = |arena: &Arena<u8>| {
+            let (slots, free, given) = arena.parts();
+            let slots = slots.iter().map(|Slot { generation, value }| Slot { generation: *generation, value: *value });
+            Arena::from_parts(1, slots.collect(), free.to_vec(), given.to_vec()).unwrap()
+        };
+        let mut after = copy(&before);
+        after.remove(gone).unwrap();
+        let undone = [after.insert(2).unwrap(), after.insert(3).unwrap(), after.insert(4).unwrap()];
+        let mut back = copy(&before);
+        back.go_on_from(&after);
+        assert_eq!((*back.get(kept).unwrap(), *back.get(gone).unwrap()), (0, 1));
+        back.remove(gone).unwrap();
+        for value in 5..9 {
+            let fresh = back.insert(value).unwrap();
+            assert!(undone.iter().all(|id| *id != fresh && back.get(*id).is_err()));
+        }
+        // The slots are those that it would have taken without the rollback.
+        assert_eq!(back.len(), 5);
+        assert_eq!(back.capacity(), 5);
     }
 }

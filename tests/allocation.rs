@@ -123,3 +123,16 @@ fn a_step_of_a_mixed_resting_scene_allocates_nothing() {
     });
     assert_eq!(counts, [0; 4]);
 }
+
+#[test]
+fn a_snapshot_into_a_buffer_with_room_allocates_nothing() {
+    let mut world = resting_scene(Scheme::Auto, true);
+    for _ in 0..10 {
+        world.step(1.0 / 60.0).unwrap();
+    }
+    let mut bytes = Vec::with_capacity(world.snapshot_size());
+    let before = ALLOCATIONS.get();
+    world.snapshot(&mut bytes);
+    world.snapshot_into(&mut bytes).unwrap();
+    assert_eq!(ALLOCATIONS.get() - before, 0);
+}

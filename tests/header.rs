@@ -22,6 +22,7 @@ const SECTIONS: &[(&str, &str)] = &[
     ("buffer", "Bulk calls"),
     ("bulk", ""),
     ("report", "What a step reports"),
+    ("snapshot", "Snapshots"),
     ("query", "Queries"),
     ("draw", "Debug drawing"),
 ];

@@ -90,6 +90,8 @@ typedef uint32_t isocoat_status;
 #define ISOCOAT_ERROR_LOCKED 7u
 /** An internal error has left the world in an unknown state: it can only be destroyed. */
 #define ISOCOAT_ERROR_POISONED 8u
+/** The bytes are not a snapshot that this library can restore: damaged, cut short, or of another format. */
+#define ISOCOAT_ERROR_SNAPSHOT 9u
 
 /**
  * The message of the last call on this thread that did not return ISOCOAT_OK: what was wrong, with the value and the
@@ -141,7 +143,8 @@ ISOCOAT_MUST_USE isocoat_status isocoat_check_abi_of(uint32_t version, const uin
 
 /**
  * Handle of a body: one deformable or rigid object. All zero is null. A handle whose body was destroyed, or of
- * another world, gives ISOCOAT_ERROR_INVALID_HANDLE; it never becomes valid again.
+ * another world, gives ISOCOAT_ERROR_INVALID_HANDLE; it never means another body. Only a restore makes it valid again,
+ * by bringing its body back.
  */
 typedef struct isocoat_body {
     /** Slot of the body in its world. */
@@ -389,6 +392,22 @@ ISOCOAT_MUST_USE isocoat_status isocoat_world_get_desc(const isocoat_world *worl
  * Errors: INVALID_ARGUMENT, OUT_OF_RANGE, UNSUPPORTED. Threads: changes the world.
  */
 ISOCOAT_MUST_USE isocoat_status isocoat_world_set_desc(isocoat_world *world, const isocoat_world_desc *desc);
+
+/**
+ * The bodies of a world, in the order of their slots.
+ *
+ * - world: not NULL.
+ * - bodies: receives the handles; NULL with capacity 0 asks for the count only.
+ * - capacity: handles that bodies can hold.
+ * - count: receives the number of bodies, also when bodies is too small; not NULL.
+ *
+ * Errors: INVALID_ARGUMENT, BUFFER_TOO_SMALL. Threads: reads the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_world_get_bodies(const isocoat_world *world,
+                                        isocoat_body *bodies,
+                                        size_t capacity,
+                                        size_t *count);
 
 /**
  * Sets who receives the messages of a world. Without one they are dropped; nothing is ever printed.
@@ -1387,7 +1406,8 @@ isocoat_status isocoat_counters_init(isocoat_counters *counters, size_t size);
  * - contacts: receives a pointer to them (not to be freed); not NULL.
  * - count: receives their number; not NULL.
  *
- * Errors: INVALID_ARGUMENT. Threads: reads the world. Lifetime: until the next step or destroy of the world.
+ * Errors: INVALID_ARGUMENT. Threads: reads the world. Lifetime: until the next step, restore or destroy
+ * of the world.
  */
 ISOCOAT_MUST_USE
 isocoat_status isocoat_world_get_contacts(const isocoat_world *world,
@@ -1401,7 +1421,8 @@ isocoat_status isocoat_world_get_contacts(const isocoat_world *world,
  * - events: receives a pointer to them (not to be freed); not NULL.
  * - count: receives their number; not NULL.
  *
- * Errors: INVALID_ARGUMENT. Threads: reads the world. Lifetime: until the next step or destroy of the world.
+ * Errors: INVALID_ARGUMENT. Threads: reads the world. Lifetime: until the next step, restore or destroy
+ * of the world.
  */
 ISOCOAT_MUST_USE
 isocoat_status isocoat_world_get_events(const isocoat_world *world,
@@ -1419,6 +1440,45 @@ isocoat_status isocoat_world_get_events(const isocoat_world *world,
 ISOCOAT_MUST_USE
 isocoat_status isocoat_world_get_counters(const isocoat_world *world,
                                           isocoat_counters *counters);
+
+/* ---- Snapshots --------------------------------------------------------------------------------------------------- */
+
+/**
+ * Takes a snapshot of a world: everything that lasts between steps, forces and impulses that wait for the next step
+ * included, but for the log, the pair filter, contacts and events. Restored and stepped on, it gives the same bits as
+ * never having stopped. It asks for no memory.
+ *
+ * - world: not NULL.
+ * - buffer: receives the snapshot, little endian on every machine; NULL with capacity 0 asks for the size only. Other
+ *   calls may change the size.
+ * - capacity: bytes in buffer.
+ * - size: receives the bytes of the snapshot, also when buffer is too small; not NULL.
+ *
+ * Pointers in user_data are kept as numbers. Errors: INVALID_ARGUMENT, BUFFER_TOO_SMALL. Threads: reads the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_world_snapshot(const isocoat_world *world,
+                                      uint8_t *buffer,
+                                      size_t capacity,
+                                      size_t *size);
+
+/**
+ * Puts a world back to what a snapshot says. Log and pair filter stay; contacts, events and the figures of the last
+ * step are empty until the next step.
+ *
+ * - world: not NULL.
+ * - buffer: the snapshot; not NULL.
+ * - size: its bytes, neither more nor fewer.
+ *
+ * Handles: in the world that took the snapshot, those taken before it are valid again, and those of what was created
+ * after it are stale for ever. In any other world, of another process too, the snapshot's objects take the place of
+ * all there was, and every handle given out so far is invalid; isocoat_world_get_bodies, isocoat_body_get_links and
+ * isocoat_link_get_skeletons give the new ones. Their index and generation are those in the world that took it.
+ *
+ * Errors: SNAPSHOT for what is damaged, cut short, of another format, or of a state that no world can be in, such as
+ * one with a number that is none; the world is then as it was. Threads: changes the world.
+ */
+ISOCOAT_MUST_USE isocoat_status isocoat_world_restore(isocoat_world *world, const uint8_t *buffer, size_t size);
 
 /* ---- Queries ----------------------------------------------------------------------------------------------------- */
 

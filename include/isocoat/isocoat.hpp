@@ -347,6 +347,34 @@ public:
         return {get(), detail::read(isocoat_body{}, isocoat_body_create, get(), &desc)};
     }
 
+    /* All bodies, in the order of their slots. */
+    std::vector<body> bodies() const
+    {
+        return detail::name<body>(get(), detail::list<isocoat_body>([this](auto... list) {
+            return isocoat_world_get_bodies(get(), list...);
+        }));
+    }
+
+    /* Takes a snapshot into a buffer, whose room is used again; the functions set above are no part of it. */
+    void snapshot(std::vector<std::uint8_t> &buffer) const
+    {
+        std::size_t size = 0;
+        check(isocoat_world_snapshot(get(), nullptr, 0, &size));
+        buffer.resize(size);
+        check(isocoat_world_snapshot(get(), buffer.data(), buffer.size(), &size));
+    }
+    std::vector<std::uint8_t> snapshot() const
+    {
+        std::vector<std::uint8_t> buffer;
+        snapshot(buffer);
+        return buffer;
+    }
+    /* Goes back to a snapshot. In any world but the one that took it, all handles given out so far become invalid. */
+    void restore(span<const std::uint8_t> buffer)
+    {
+        check(isocoat_world_restore(get(), buffer.data(), buffer.size()));
+    }
+
     /* Advances by dt seconds. What a callback throws comes out of here, after the step has ended. */
     void step(double dt)
     {
@@ -355,7 +383,7 @@ public:
         check(status);
     }
 
-    /* Contacts and events of the last step: views until the next step. */
+    /* Contacts and events of the last step: views until the next step or restore. */
     span<const contact> contacts() const
     {
         const contact *first = nullptr;

@@ -3,7 +3,8 @@
 use crate::world::{BodyId, LinkId, SkeletonId};
 
 /// Handle of a body: one deformable or rigid object. All zero is null. A handle whose body was destroyed, or of
-/// another world, gives ISOCOAT_ERROR_INVALID_HANDLE; it never becomes valid again.
+/// another world, gives ISOCOAT_ERROR_INVALID_HANDLE; it never means another body. Only a restore makes it valid again,
+/// by bringing its body back.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(C)]
 pub struct isocoat_body {

@@ -146,7 +146,7 @@ impl<T> List<T> {
             not_null(first, name)?;
         }
         // SAFETY: the caller's promise.
-        let count = unsafe { Count::new(count) }?;
+        let count = unsafe { Count::new(count, "count") }?;
         Ok(Self { first, capacity, count })
     }
 
@@ -163,14 +163,42 @@ impl<T> List<T> {
     }
 }
 
+/// A buffer of bytes that are made in place, and whose size the host may ask for first.
+pub(super) struct Bytes {
+    first: *mut u8,
+    capacity: usize,
+    size: Count,
+}
+
+impl Bytes {
+    /// # Safety
+    /// `first` is NULL or `capacity` bytes can be written there, `size` is NULL or writable, until the call returns.
+    pub unsafe fn new(first: *mut u8, capacity: usize, name: &str, size: *mut usize, size_name: &str) -> Checked<Self> {
+        if capacity > 0 {
+            not_null(first, name)?;
+        }
+        check_count::<u8>(capacity, name)?;
+        // SAFETY: the caller's promise.
+        let size = unsafe { Count::new(size, size_name) }?;
+        Ok(Self { first, capacity, size })
+    }
+
+    /// Writes the size, and gives the bytes to be filled, if they are wanted and fit.
+    pub fn claim<'a>(self, needed: usize) -> Checked<Option<&'a mut [u8]>> {
+        self.size.put(needed, self.capacity, !self.first.is_null())?;
+        // SAFETY: `needed <= capacity` bytes can be written at `first`, as promised to `new`.
+        Ok((!self.first.is_null()).then(|| unsafe { std::slice::from_raw_parts_mut(self.first, needed) }))
+    }
+}
+
 /// Where a count goes. It is written also when the buffers are too small, so that the host can make them larger.
 pub(super) struct Count(*mut usize);
 
 impl Count {
     /// # Safety
     /// `pointer` is NULL or writable until the call returns.
-    pub unsafe fn new(pointer: *mut usize) -> Checked<Self> {
-        not_null(pointer, "count")?;
+    pub unsafe fn new(pointer: *mut usize, name: &str) -> Checked<Self> {
+        not_null(pointer, name)?;
         Ok(Self(pointer))
     }
 

@@ -282,7 +282,7 @@ pub unsafe extern "C" fn isocoat_skeleton_get_seeds(
         read(world, |inner| {
             let positions = Elements::<3>::new(positions, "positions")?;
             let normals = Elements::<3>::new(normals, "normals")?;
-            let count = Count::new(count)?;
+            let count = Count::new(count, "count")?;
             let seeds = inner.world.seeds(skeleton.into())?;
             let wanted = positions.is_wanted() || normals.is_wanted() || !valid.is_null();
             count.put(seeds.len(), capacity, wanted)?;

@@ -207,7 +207,8 @@ pub unsafe extern "C" fn isocoat_counters_init(counters: *mut isocoat_counters, 
 /// - contacts: receives a pointer to them (not to be freed); not NULL.
 /// - count: receives their number; not NULL.
 ///
-/// Errors: INVALID_ARGUMENT. Threads: reads the world. Lifetime: until the next step or destroy of the world.
+/// Errors: INVALID_ARGUMENT. Threads: reads the world. Lifetime: until the next step, restore or destroy
+/// of the world.
 #[must_use]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn isocoat_world_get_contacts(
@@ -232,7 +233,8 @@ pub unsafe extern "C" fn isocoat_world_get_contacts(
 /// - events: receives a pointer to them (not to be freed); not NULL.
 /// - count: receives their number; not NULL.
 ///
-/// Errors: INVALID_ARGUMENT. Threads: reads the world. Lifetime: until the next step or destroy of the world.
+/// Errors: INVALID_ARGUMENT. Threads: reads the world. Lifetime: until the next step, restore or destroy
+/// of the world.
 #[must_use]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn isocoat_world_get_events(

@@ -28,6 +28,8 @@ pub const ISOCOAT_ERROR_BUFFER_TOO_SMALL: isocoat_status = 6;
 pub const ISOCOAT_ERROR_LOCKED: isocoat_status = 7;
 /// An internal error has left the world in an unknown state: it can only be destroyed.
 pub const ISOCOAT_ERROR_POISONED: isocoat_status = 8;
+/// The bytes are not a snapshot that this library can restore: damaged, cut short, or of another format.
+pub const ISOCOAT_ERROR_SNAPSHOT: isocoat_status = 9;
 
 /// A refused call: its code and its message.
 #[derive(Debug)]
@@ -62,6 +64,7 @@ impl From<Error> for Refusal {
             Error::OutOfRange { .. } => ISOCOAT_ERROR_OUT_OF_RANGE,
             Error::Unsupported(_) => ISOCOAT_ERROR_UNSUPPORTED,
             Error::Capacity(_) => ISOCOAT_ERROR_CAPACITY,
+            Error::Snapshot(_) => ISOCOAT_ERROR_SNAPSHOT,
         };
         Self::new(status, error.to_string())
     }
@@ -121,6 +124,7 @@ pub extern "C" fn isocoat_status_name(status: isocoat_status) -> *const c_char {
         ISOCOAT_ERROR_BUFFER_TOO_SMALL => c"ISOCOAT_ERROR_BUFFER_TOO_SMALL",
         ISOCOAT_ERROR_LOCKED => c"ISOCOAT_ERROR_LOCKED",
         ISOCOAT_ERROR_POISONED => c"ISOCOAT_ERROR_POISONED",
+        ISOCOAT_ERROR_SNAPSHOT => c"ISOCOAT_ERROR_SNAPSHOT",
         _ => c"unknown status",
     };
     name.as_ptr()

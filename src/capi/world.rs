@@ -7,7 +7,7 @@ use libc::{c_char, c_void, size_t};
 use super::descriptor::{self, Descriptor, OutStruct};
 use super::guard::{self, free, isocoat_world, outside, read, write};
 use super::handle::isocoat_body;
-use super::pointer::Out;
+use super::pointer::{List, Out};
 use super::status::{Checked, Refusal, isocoat_status};
 use crate::world::{BodyId, LogLevel, Response, Scheme, World, WorldDesc};
 
@@ -267,6 +267,31 @@ pub unsafe extern "C" fn isocoat_world_set_desc(
 ) -> isocoat_status {
     // SAFETY: the pointers are NULL or as their lines say.
     unsafe { write(world, |inner| Ok(inner.world.set_desc(descriptor::read(desc, "desc")?.to_rust()?)?)) }
+}
+
+/// The bodies of a world, in the order of their slots.
+///
+/// - world: not NULL.
+/// - bodies: receives the handles; NULL with capacity 0 asks for the count only.
+/// - capacity: handles that bodies can hold.
+/// - count: receives the number of bodies, also when bodies is too small; not NULL.
+///
+/// Errors: INVALID_ARGUMENT, BUFFER_TOO_SMALL. Threads: reads the world.
+#[must_use]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn isocoat_world_get_bodies(
+    world: *const isocoat_world,
+    bodies: *mut isocoat_body,
+    capacity: size_t,
+    count: *mut size_t,
+) -> isocoat_status {
+    // SAFETY: the pointers are NULL or as their lines say.
+    unsafe {
+        read(world, |inner| {
+            let out = List::new(bodies, capacity, "bodies", count)?;
+            out.put(inner.world.counters().bodies as usize, inner.world.bodies().map(isocoat_body::from))
+        })
+    }
 }
 
 /// Receives the messages of a world, on the thread of the call that has something to say.

@@ -57,6 +57,13 @@ impl Placement {
 }
 
 impl Candidate {
+    /// What a snapshot keeps. The rest is made anew in each step; whoever adds a field decides here.
+    pub fn lasting(&self) -> &Memory {
+        let Self { bodies: _, lead: _, pair: _, material: _, surface: _, nodes: _, reference: _, loads: _, memory } =
+            self;
+        memory
+    }
+
     /// Brings the contact surface up to the present poses, by a fresh integration when `fresh` or when the bodies have
     /// moved too far against each other. Gives the evaluations of the two fields that it took.
     pub fn look(&mut self, motions: &[Motion], settings: &Settings, fresh: bool) -> u32 {

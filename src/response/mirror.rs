@@ -20,23 +20,23 @@ const TELEPORT_ANGLE: f64 = 0.5;
 /// What is kept of a mirror between ticks.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Mirror {
-    active: bool,
+    pub(crate) active: bool,
     /// Velocities at the end of the last tick.
-    twist: Twist,
+    pub(crate) twist: Twist,
     /// Where the host should be now, and how fast, in its own convention.
-    expected_center: Vec3,
-    expected_rotation: Quat,
-    expected_twist: Twist,
+    pub(crate) expected_center: Vec3,
+    pub(crate) expected_rotation: Quat,
+    pub(crate) expected_twist: Twist,
     /// Size of the change of velocity that the last impulse was to bring \[m/s\].
-    commanded: f64,
+    pub(crate) commanded: f64,
     /// What the next impulse owes from when the mirror was last in use, as a change of velocity.
-    owed: Twist,
+    pub(crate) owed: Twist,
     /// What joints and contacts of the host's own seem to do to it, as an acceleration; while it is held.
-    estimate: Twist,
+    pub(crate) estimate: Twist,
     /// Where the last impulse should have brought a held host's velocities; they are known.
-    bypassed: Option<Twist>,
+    pub(crate) bypassed: Option<Twist>,
     /// Steps for which the host counts as held by something that the library does not know.
-    doubt: u8,
+    pub(crate) doubt: u8,
 }
 
 /// Part of the commanded change of velocity by which a free host may be off.

@@ -56,25 +56,25 @@ impl World {
     /// Draws the enabled bodies, as chosen by `flags`, into `sink`; unknown bits are ignored.
     pub fn debug_draw(&self, flags: DrawFlags, sink: &mut dyn DebugDraw) {
         for body in self.bodies.indices().filter(|body| self.bodies[*body].enabled) {
-            let snapshot = self.snapshot(body);
+            let posed = self.posed_coat(body);
             if flags.contains(DrawFlags::SKELETONS) {
-                for (placed, index) in snapshot.coat.skeletons.iter().zip(&snapshot.skeletons) {
+                for (placed, index) in posed.coat.skeletons.iter().zip(&posed.skeletons) {
                     let skeleton = &self.skeletons[*index];
                     let shape = skeleton.desc.shape.transformed(&self.links[skeleton.link as usize].desc.pose);
                     draw_shape(&shape, placed.profile.thickness, sink);
                 }
             }
             if flags.contains(DrawFlags::SEEDS) {
-                for index in &snapshot.skeletons {
+                for index in &posed.skeletons {
                     self.draw_seeds(*index, sink);
                 }
             }
             if flags.contains(DrawFlags::BOUNDS) {
-                let (low, high) = snapshot.coat.bounds();
+                let (low, high) = posed.coat.bounds();
                 let half = (high - low) * 0.5;
                 if crate::math::is_finite(&half) && half.min() > 0.0 {
                     let axes = [Vec3::x() * half.x, Vec3::y() * half.y, Vec3::z() * half.z];
-                    draw_box(&snapshot.globalise(&(low + half)), &axes, BOX, sink);
+                    draw_box(&posed.globalise(&(low + half)), &axes, BOX, sink);
                 }
             }
         }

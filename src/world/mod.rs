@@ -3,12 +3,14 @@
 //! This file holds the nouns and their life; [`step`] is the pipeline, [`query`] what can be asked in between.
 
 pub use crate::handle as arena;
+mod bytes;
 pub mod desc;
 pub mod draw;
 pub mod events;
 mod gather;
 pub mod query;
 mod respond;
+mod snapshot;
 mod step;
 mod units;
 
@@ -108,6 +110,8 @@ pub type PairFilter = Box<dyn FnMut(BodyId, BodyId) -> bool + Send>;
 /// Everything; see the [module](self). Worlds are independent of each other.
 pub struct World {
     desc: WorldDesc,
+    /// Which handles are this world's, told apart in all processes: see [`World::restore`].
+    origin: u64,
     bodies: Arena<Body>,
     links: Arena<Link>,
     skeletons: Arena<Skeleton>,
@@ -136,6 +140,7 @@ impl World {
         let tag = next_world_tag();
         Ok(Self {
             desc,
+            origin: snapshot::new_origin(),
             bodies: Arena::new(tag),
             links: Arena::new(tag),
             skeletons: Arena::new(tag),
@@ -173,6 +178,11 @@ impl World {
     /// Sets who decides about pairs, after categories and masks.
     pub fn set_pair_filter(&mut self, filter: Option<PairFilter>) {
         self.pair_filter = filter;
+    }
+
+    /// All bodies, in the order of their slots.
+    pub fn bodies(&self) -> impl Iterator<Item = BodyId> + '_ {
+        self.bodies.indices().map(|index| self.bodies.id_of(index))
     }
 
     /// Creates a body without links.
@@ -340,6 +350,11 @@ impl World {
     /// Brings what is derived from a body's parts up to date after a change of any of them.
     fn refresh(&mut self, slot: usize) {
         self.bodies[slot].units = units::Said::default();
+        self.measure(slot);
+    }
+
+    /// Works out what follows from the descriptors of a body and its parts.
+    fn measure(&mut self, slot: usize) {
         let body = &self.bodies[slot];
         let skeletons: Vec<u32> = self.skeletons_of(body).map(|(_, index, _)| index).collect();
         for index in &skeletons {

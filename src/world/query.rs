@@ -51,12 +51,12 @@ pub struct Seed {
 }
 
 /// A body's coat as it is now, and the arena indices of the skeletons in it.
-pub(super) struct Snapshot {
+pub(super) struct PosedCoat {
     pub(super) coat: Coat,
     pub(super) skeletons: Vec<usize>,
 }
 
-impl Snapshot {
+impl PosedCoat {
     pub(super) fn localise(&self, p: &Vec3) -> Vec3 {
         p - self.coat.origin
     }
@@ -68,7 +68,7 @@ impl Snapshot {
 
 impl World {
     /// The enabled skeletons of a body at the present poses, in a frame at its first link.
-    pub(super) fn snapshot(&self, body: usize) -> Snapshot {
+    pub(super) fn posed_coat(&self, body: usize) -> PosedCoat {
         let body = &self.bodies[body];
         let links = || body.links.iter().map(|index| &self.links[*index as usize]);
         let origin = links().next().map_or(Vec3::zeros(), |link| link.desc.pose.position);
@@ -83,7 +83,7 @@ impl World {
                 }
             }
         }
-        Snapshot { coat, skeletons }
+        PosedCoat { coat, skeletons }
     }
 
     /// Bodies that take part and have a bit of the mask in their category, in the order of their ids.
@@ -118,9 +118,9 @@ impl World {
         if let Some(p) = points.iter().find(|p| !p.iter().all(|x| x.is_finite())) {
             return Err(out_of_range("point", format_args!("({}, {}, {})", p[0], p[1], p[2]), "finite"));
         }
-        let snapshot = self.snapshot(body.index());
-        let local: Vec<[f64; 3]> = points.iter().map(|p| snapshot.localise(&Vec3::from(*p)).into()).collect();
-        lanes::evaluate(&snapshot.coat.skeletons, &local, values, gradients);
+        let posed = self.posed_coat(body.index());
+        let local: Vec<[f64; 3]> = points.iter().map(|p| posed.localise(&Vec3::from(*p)).into()).collect();
+        lanes::evaluate(&posed.coat.skeletons, &local, values, gradients);
         Ok(())
     }
 
@@ -141,17 +141,17 @@ impl World {
         let mut length = max_distance;
         let mut first = None;
         for body in self.bodies_of(mask) {
-            let snapshot = self.snapshot(body);
-            let Some(hit) = ray::cast(&snapshot.coat, &snapshot.localise(origin), &direction, length) else { continue };
+            let posed = self.posed_coat(body);
+            let Some(hit) = ray::cast(&posed.coat, &posed.localise(origin), &direction, length) else { continue };
             if first.is_none() || hit.distance < length {
                 length = hit.distance;
-                let (skeleton, link) = self.skeleton_and_link(snapshot.skeletons[hit.skeleton]);
+                let (skeleton, link) = self.skeleton_and_link(posed.skeletons[hit.skeleton]);
                 first = Some(RayHit {
                     body: self.bodies.id_of(body),
                     link,
                     skeleton,
                     distance: hit.distance,
-                    position: snapshot.globalise(&hit.position),
+                    position: posed.globalise(&hit.position),
                     normal: hit.normal,
                 });
             }
@@ -168,7 +168,7 @@ impl World {
         require_finite("center", center)?;
         require("radius", radius, "at least 0", |x| x >= 0.0)?;
         let touches = |body: &usize| {
-            let Snapshot { coat, .. } = self.snapshot(*body);
+            let PosedCoat { coat, .. } = self.posed_coat(*body);
             let p = center - coat.origin;
             let in_reach = |k: &crate::field::Placed| k.shape.closest(&p).distance <= radius + k.profile.radius;
             coat.skeletons.iter().any(in_reach)
@@ -182,11 +182,11 @@ impl World {
     pub fn closest_point(&self, body: BodyId, point: &Vec3) -> Result<Option<SurfacePoint>> {
         self.bodies.get(body)?;
         require_finite("point", point)?;
-        let snapshot = self.snapshot(body.index());
-        let hit = closest::closest(&snapshot.coat, &snapshot.localise(point));
+        let posed = self.posed_coat(body.index());
+        let hit = closest::closest(&posed.coat, &posed.localise(point));
         Ok(hit.map(|SurfaceHit { distance, position, normal, skeleton }| {
-            let (skeleton, link) = self.skeleton_and_link(snapshot.skeletons[skeleton]);
-            SurfacePoint { position: snapshot.globalise(&position), normal, distance, link, skeleton }
+            let (skeleton, link) = self.skeleton_and_link(posed.skeletons[skeleton]);
+            SurfacePoint { position: posed.globalise(&position), normal, distance, link, skeleton }
         }))
     }
 
@@ -195,22 +195,22 @@ impl World {
     /// none while the skeleton or its link is disabled.
     pub fn seeds(&self, skeleton: SkeletonId) -> Result<Vec<Seed>> {
         let link = self.skeletons.get(skeleton)?.link as usize;
-        let snapshot = self.snapshot(self.links[link].body as usize);
-        let Some(index) = snapshot.skeletons.iter().position(|k| *k == skeleton.index()) else {
+        let posed = self.posed_coat(self.links[link].body as usize);
+        let Some(index) = posed.skeletons.iter().position(|k| *k == skeleton.index()) else {
             return Ok(Vec::new());
         };
         let desc = &self.skeletons[skeleton.index()].desc;
         let count = if desc.seed_count == 0 { self.desc.seed_count } else { desc.seed_count };
         let mut rays = Vec::new();
         seeds::rays(&desc.shape, desc.thickness, count as usize, &mut rays);
-        let pose = snapshot.coat.localise(&self.links[link].desc.pose);
+        let pose = posed.coat.localise(&self.links[link].desc.pose);
         for ray in &mut rays {
             *ray = ray.transformed(&pose);
         }
         let mut ends = Vec::new();
-        territory::seeds(&snapshot.coat, index, &rays, &mut ends);
+        territory::seeds(&posed.coat, index, &rays, &mut ends);
         let globalise = |seed: &territory::Seed| Seed {
-            position: snapshot.globalise(&seed.position),
+            position: posed.globalise(&seed.position),
             normal: seed.normal,
             valid: seed.is_valid(),
         };

@@ -4,7 +4,7 @@ use super::events::{Contact, Counters, Event, EventKind, LogLevel};
 use super::{BodyId, Link, World, units};
 use crate::base::{Kind, Motion};
 use crate::contact::broad_phase::{self, Bounds};
-use crate::contact::candidate::Candidate;
+use crate::contact::candidate::{Candidate, Memory};
 use crate::contact::{pair::Side, surface};
 use crate::error::{Result, require};
 use crate::math::Wrench;
@@ -52,6 +52,48 @@ impl Stepping {
 
     pub fn counters(&self) -> Counters {
         self.counters
+    }
+
+    /// What a snapshot keeps. The rest are buffers and reports; whoever adds a field decides here.
+    pub fn lasting(&self) -> &[Candidate] {
+        let Self {
+            candidates,
+            motions: _,
+            responses: _,
+            bounds: _,
+            bounds_of: _,
+            pairs: _,
+            previous: _,
+            spare: _,
+            islands: _,
+            island_count: _,
+            roots: _,
+            island_of: _,
+            touches: _,
+            rates: _,
+            work: _,
+            implicit: _,
+            contacts: _,
+            events: _,
+            counters: _,
+        } = self;
+        candidates
+    }
+
+    /// Goes on from what a snapshot has kept, in the buffers that are there. Nothing is reported until the next step.
+    pub fn restart(&mut self, memories: Vec<Memory>) {
+        // Whose buffers a candidate has does not matter: those that stay where they are need not be moved.
+        while self.candidates.len() < memories.len() {
+            self.candidates.push(self.spare.pop().unwrap_or_default());
+        }
+        self.spare.extend(self.candidates.drain(memories.len()..));
+        for (candidate, memory) in self.candidates.iter_mut().zip(memories) {
+            candidate.bodies = memory.ids.map(|id| id.index);
+            candidate.memory = memory;
+        }
+        self.contacts.clear();
+        self.events.clear();
+        self.counters = Counters::default();
     }
 
     /// What the contacts of a body went through no longer counts: it was put elsewhere.

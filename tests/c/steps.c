@@ -117,6 +117,9 @@ static void everything_is_locked(filter_calls *all)
     REFUSED(isocoat_world_get_contacts(world, &contacts, &count), locked, why);
     REFUSED(isocoat_world_get_events(world, &events, &count), locked, why);
     REFUSED(isocoat_world_get_counters(world, &counters), locked, why);
+    REFUSED(isocoat_world_get_bodies(world, &b.body, 1, &count), locked, why);
+    REFUSED(isocoat_world_snapshot(world, NULL, 0, &count), locked, why);
+    REFUSED(isocoat_world_restore(world, NULL, 0), locked, why);
     REFUSED(isocoat_world_set_link_states(world, &b.link, &state, 1), locked, why);
     REFUSED(isocoat_world_get_link_states(world, &b.link, 1, skip, skip), locked, why);
     REFUSED(isocoat_world_get_link_wrenches(world, &b.link, 1, skip, skip), locked, why);

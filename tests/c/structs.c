@@ -312,6 +312,7 @@ static void messages_are_cut_to_fit(void)
     CHECK(isocoat_last_error(NULL, 0) == length);
     CHECK(strcmp(isocoat_status_name(ISOCOAT_OK), "ISOCOAT_OK") == 0);
     CHECK(strcmp(isocoat_status_name(ISOCOAT_ERROR_POISONED), "ISOCOAT_ERROR_POISONED") == 0);
+    CHECK(strcmp(isocoat_status_name(ISOCOAT_ERROR_SNAPSHOT), "ISOCOAT_ERROR_SNAPSHOT") == 0);
     CHECK(strcmp(isocoat_status_name(99), "unknown status") == 0);
 }
 

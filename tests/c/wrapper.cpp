@@ -193,6 +193,36 @@ static void motion()
     CHECK(isocoat::inertia_of_capsule(1.0, 0.1, 0.2)[8] > 0.0);
 }
 
+static void snapshots()
+{
+    isocoat::world world = falling_world();
+    const isocoat::body ball = world.bodies()[1];
+    world.step(0.01);
+    const std::vector<std::uint8_t> taken = world.snapshot();
+    world.step(0.01);
+    const isocoat::link_state expected = ball.links()[0].state();
+    world.restore(taken);
+    CHECK(world.contacts().empty() && world.bodies()[1] == ball);
+    world.step(0.01);
+    const isocoat::link_state found = ball.links()[0].state();
+    CHECK(std::memcmp(&found, &expected, sizeof found) == 0);
+
+    isocoat::world other;
+    other.restore(taken);
+    other.step(0.01);
+    const isocoat::link_state there = other.bodies()[1].links()[0].state();
+    CHECK(std::memcmp(&there, &expected, sizeof there) == 0);
+
+    std::vector<std::uint8_t> damaged = taken;
+    damaged[100] ^= 1;
+    try {
+        world.restore(damaged);
+        CHECK(false);
+    } catch (const isocoat::error &error) {
+        CHECK(error.status() == ISOCOAT_ERROR_SNAPSHOT && std::strstr(error.what(), "checksum") != nullptr);
+    }
+}
+
 static void queries()
 {
     const isocoat::world world = falling_world();
@@ -234,6 +264,7 @@ int main()
     steps_and_views();
     what_a_callback_throws_comes_out_of_the_step();
     motion();
+    snapshots();
     queries();
     if (failures == 0) std::puts("wrapper: all checks hold");
     return failures == 0 ? 0 : 1;
