@@ -63,8 +63,8 @@ fn pit(count: usize) -> World {
     world.step(DT).expect("a step");
     let counters = world.counters();
     println!(
-        "{count} balls: {} patches, {} islands, {} sub-steps, {} evaluations a step",
-        counters.patches, counters.islands, counters.substeps, counters.evaluations
+        "{count} balls: {} patches, {} islands, {} sub-steps, {} rounds, {} evaluations a step",
+        counters.patches, counters.islands, counters.substeps, counters.implicit_rounds, counters.evaluations
     );
     world
 }

@@ -8,6 +8,7 @@
 
 use nalgebra::{Matrix6, Vector6};
 
+use super::conjugate::Blocks;
 use super::envelope::{BLOCK, Envelope};
 use crate::base::{Inertia, Motion};
 use crate::contact::press::Material;
@@ -154,7 +155,10 @@ pub struct Coupled {
     mobilities: Vec<Matrix6<f64>>,
     blocks: Vec<u32>,
     first: Vec<u32>,
+    /// The system is too wide for a factor.
+    wide: bool,
     matrix: Envelope,
+    blocks_of_matrix: Blocks,
     residual: Vec<f64>,
     base: Vec<f64>,
     step: Vec<f64>,
@@ -173,6 +177,15 @@ const FLAT: f64 = 0.2;
 
 /// Residual over the kinetic energy at work, both squared, that counts as solved.
 const SOLVED: f64 = 1e-24;
+
+/// Products of a factor beyond which conjugate gradients are quicker.
+const WIDE: usize = 1_000_000;
+
+/// What conjugate gradients leave of a Newton step.
+const GRADIENTS: f64 = 1e-6;
+
+/// Most conjugate gradients in one Newton step.
+const MOST_GRADIENTS: usize = 400;
 
 /// Slot without unknowns.
 const NONE: u32 = u32::MAX;
@@ -239,10 +252,9 @@ impl Coupled {
             }
             self.newton_steps += 1;
             self.step.clone_from(&self.residual);
-            if !self.matrix.factor() {
+            if !self.solve_step() {
                 return false;
             }
-            self.matrix.solve(&mut self.step);
             self.base.clear();
             self.base.extend_from_slice(x);
             let last = norm;
@@ -254,6 +266,25 @@ impl Coupled {
             }
         }
         norm <= 1e-10 * scale
+    }
+
+    fn solve_step(&mut self) -> bool {
+        if self.wide {
+            return self.blocks_of_matrix.solve(&mut self.step, GRADIENTS, MOST_GRADIENTS);
+        }
+        let definite = self.matrix.factor();
+        if definite {
+            self.matrix.solve(&mut self.step);
+        }
+        definite
+    }
+
+    fn add(&mut self, i: usize, j: usize, block: &Matrix6<f64>) {
+        if self.wide {
+            self.blocks_of_matrix.add(i, j, block);
+        } else {
+            self.matrix.add(i, j, block);
+        }
     }
 
     fn put_step(&self, x: &mut [f64], part: f64) {
@@ -328,22 +359,28 @@ impl Coupled {
                 *first = lowest.min(*first);
             }
         }
-        self.matrix.reset(&self.first);
+        self.wide = Envelope::cost(&self.first) > WIDE;
+        if !self.wide {
+            self.matrix.reset(&self.first);
+        }
     }
 
     /// Residual `M (x - free) - h Σ forces` and its derivative.
     fn assemble(&mut self, x: &[f64], free: &[f64], fixed: &[Motion], h: f64, with_matrix: bool) {
-        if with_matrix {
+        if with_matrix && self.wide {
+            self.blocks_of_matrix.reset(self.masses.len());
+        } else if with_matrix {
             self.matrix.zero();
         }
         self.residual.clear();
-        for (block, mass) in self.masses.iter().enumerate() {
+        for block in 0..self.masses.len() {
+            let mass = self.masses[block];
             let range = block * BLOCK..(block + 1) * BLOCK;
             let change =
                 Vector6::from_column_slice(&x[range.clone()]) - Vector6::from_column_slice(&free[range.clone()]);
             self.residual.extend_from_slice((mass * change).as_slice());
             if with_matrix {
-                self.matrix.add(block, block, mass);
+                self.add(block, block, &mass);
             }
         }
         for index in 0..self.groups.len() {
@@ -354,8 +391,8 @@ impl Coupled {
             if push.all == Wrench::default() {
                 continue;
             }
-            let members = &self.members[group.members.0..group.members.1];
-            for (row, member) in members.iter().enumerate() {
+            for row in group.members.0..group.members.1 {
+                let member = self.members[row];
                 let i = self.blocks[member.link as usize];
                 if i == NONE {
                     continue;
@@ -370,16 +407,17 @@ impl Coupled {
                     continue;
                 }
                 let shifted = member.back(&slope);
-                for other in &members[..=row] {
+                for other in group.members.0..=row {
+                    let other = self.members[other];
                     let j = self.blocks[other.link as usize];
                     if j == NONE {
                         continue;
                     }
                     let block = other.forth(&shifted).to_matrix(h * member.weight * other.weight);
                     if i > j || i == j && other.link == member.link {
-                        self.matrix.add(i as usize, j as usize, &block);
+                        self.add(i as usize, j as usize, &block);
                     } else {
-                        self.matrix.add(j as usize, i as usize, &block.transpose());
+                        self.add(j as usize, i as usize, &block.transpose());
                     }
                 }
             }

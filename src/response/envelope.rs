@@ -21,6 +21,12 @@ pub struct Envelope {
 }
 
 impl Envelope {
+    /// Products that a factor of this shape takes, nearly.
+    pub fn cost(first: &[u32]) -> usize {
+        let square = |(block, first): (usize, &u32)| BLOCK * (BLOCK * (block + 1 - *first as usize)).pow(2) / 2;
+        first.iter().enumerate().map(square).sum()
+    }
+
     /// Sets the shape, all zero: `first[i]` is the first block that couples with block `i`.
     pub fn reset(&mut self, first: &[u32]) {
         self.first.clear();

@@ -1,5 +1,6 @@
 //! Response: how contact forces move links.
 
+pub mod conjugate;
 pub mod coupled;
 pub mod envelope;
 pub mod explicit;
