@@ -176,13 +176,13 @@ const MOST_LOOKS: usize = 12;
 const FLAT: f64 = 0.2;
 
 /// Residual over the kinetic energy at work, both squared, that counts as solved.
-const SOLVED: f64 = 1e-24;
+const SOLVED: f64 = 1e-18;
 
 /// Products of a factor beyond which conjugate gradients are quicker.
-const WIDE: usize = 1_000_000;
+const WIDE: usize = 100_000;
 
-/// What conjugate gradients leave of a Newton step.
-const GRADIENTS: f64 = 1e-6;
+/// Least and most that conjugate gradients leave of a Newton step.
+const GRADIENTS: (f64, f64) = (1e-6, 1e-2);
 
 /// Most conjugate gradients in one Newton step.
 const MOST_GRADIENTS: usize = 400;
@@ -252,7 +252,9 @@ impl Coupled {
             }
             self.newton_steps += 1;
             self.step.clone_from(&self.residual);
-            if !self.solve_step() {
+            // As exactly as it takes to be done after this step, or as a step of Newton's method can use.
+            let enough = (0.3 * (SOLVED * scale / norm).sqrt()).clamp(GRADIENTS.0, GRADIENTS.1);
+            if !self.solve_step(enough) {
                 return false;
             }
             self.base.clear();
@@ -268,9 +270,9 @@ impl Coupled {
         norm <= 1e-10 * scale
     }
 
-    fn solve_step(&mut self) -> bool {
+    fn solve_step(&mut self, enough: f64) -> bool {
         if self.wide {
-            return self.blocks_of_matrix.solve(&mut self.step, GRADIENTS, MOST_GRADIENTS);
+            return self.blocks_of_matrix.solve(&mut self.step, enough, MOST_GRADIENTS);
         }
         let definite = self.matrix.factor();
         if definite {
