@@ -13,7 +13,7 @@ use common::{Coat, G, Random, ball_inertia, box_inertia};
 use isocoat::base::Kind;
 use isocoat::field::Shape;
 use isocoat::math::{Mat3, Pose, Twist, Vec3};
-use isocoat::world::{BodyDesc, EventKind, LinkDesc, LinkId, Response, SkeletonDesc, World, WorldDesc};
+use isocoat::world::{BodyDesc, EventKind, LinkDesc, LinkId, Response, World, WorldDesc};
 
 /// What a row changes.
 #[derive(Clone, Copy, Debug)]
@@ -216,7 +216,8 @@ impl Outcome {
         // The sub-steps keep energy to about a per cent a bounce, without trend.
         let most = if response == Response::Implicit { 1e-3 } else { 0.03 };
         let reported = self.overloads > 0 || self.warned;
-        self.finite && (self.gain <= most || reported) && (!self.escaped || reported)
+        let most = if reported { most.max(0.1) } else { most };
+        self.finite && self.gain <= most && !self.escaped
     }
 }
 
@@ -226,6 +227,8 @@ fn run(build: Build, knobs: &Knobs, response: Response, seconds: f64) -> Outcome
     let flag = warned.clone();
     scene.world.set_log(Some(Box::new(move |_, _| flag.store(true, std::sync::atomic::Ordering::Relaxed))));
     let first = scene.energy(knobs.gravity);
+    // Of a scene that does not move at all.
+    let slight = 1e-9 * scene.movers.iter().map(|(_, mass, _)| mass * G * scene.size).sum::<f64>();
     let mut outcome = Outcome {
         finite: true,
         gain: 0.0,
@@ -246,7 +249,7 @@ fn run(build: Build, knobs: &Knobs, response: Response, seconds: f64) -> Outcome
         if !outcome.finite || begin.elapsed().as_secs_f64() > 20.0 {
             break;
         }
-        outcome.gain = outcome.gain.max((energy - first) / first.abs().max(1e-300));
+        outcome.gain = outcome.gain.max((energy - first) / (first.abs() + slight));
         for (link, _, _) in &scene.movers {
             let p = scene.world.link_state(*link).unwrap().pose.position - scene.origin;
             outcome.deepest = outcome.deepest.max(-p.z / scene.size);

@@ -29,27 +29,15 @@ pub struct Limits {
     pub most: u32,
 }
 
-/// What a step of an island took.
-#[derive(Clone, Copy, Debug)]
-pub struct Taken {
-    /// Sub-steps taken.
-    pub substeps: u32,
-    /// Sub-steps that the limits on phase and travel asked for.
-    pub wanted: f64,
-}
-
-/// Advances an island by `dt`. `rates` has a place for each link, all zero, and is left so.
-#[expect(clippy::too_many_arguments, reason = "an island's step touches the whole state")]
-pub fn step(
-    motions: &mut [Motion],
+/// Sub-steps that an island's step of `dt` asks for. `rates` has a place for each link, all zero, and is left so.
+pub fn plan(
+    motions: &[Motion],
     island: &Island,
     candidates: &mut [Candidate],
     dt: f64,
-    settings: &Settings,
     limits: &Limits,
     rates: &mut [f64],
-    work: &mut Work,
-) -> Taken {
+) -> f64 {
     let mut travel = 0.0f64;
     for index in &island.candidates {
         let candidate = &mut candidates[*index as usize];
@@ -67,13 +55,27 @@ pub fn step(
     for link in &island.links {
         rate2 = rate2.max(std::mem::take(&mut rates[*link as usize]));
     }
-    let wanted = (rate2.sqrt() * dt / limits.phase).max(travel / TRAVEL).ceil().max(1.0);
+    (rate2.sqrt() * dt / limits.phase).max(travel / TRAVEL).ceil().max(1.0)
+}
+
+/// Advances an island by `dt` in the sub-steps that [`plan`] wants, as far as the limits let it. Gives their number.
+#[expect(clippy::too_many_arguments, reason = "an island's step touches the whole state")]
+pub fn step(
+    motions: &mut [Motion],
+    island: &Island,
+    candidates: &mut [Candidate],
+    dt: f64,
+    settings: &Settings,
+    limits: &Limits,
+    wanted: f64,
+    work: &mut Work,
+) -> u32 {
     let substeps = wanted.min(f64::from(limits.most)) as u32;
     let h = dt / f64::from(substeps);
     for index in 0..substeps {
         advance(motions, island, candidates, h, 0.5, settings, index == 0, work);
     }
-    Taken { substeps, wanted }
+    substeps
 }
 
 /// The links of a pair, each once.

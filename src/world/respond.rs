@@ -32,7 +32,16 @@ impl World {
         self.notice_stacks(state);
         let mut short = 0.0f64;
         for index in 0..state.island_count {
-            let response = self.choose(&state.islands[index], state);
+            let (mut response, forced) = self.choose(&state.islands[index], state);
+            let mut wanted = 1.0;
+            if response == Response::Substepped {
+                let (island, rates) = (&state.islands[index], &mut state.rates);
+                wanted = substepped::plan(&state.motions, island, &mut state.candidates, dt, &limits, rates);
+                // Too few sub-steps would gain energy without end.
+                if wanted > f64::from(limits.most) && !forced {
+                    response = Response::Implicit;
+                }
+            }
             self.meet_hosts(state, index, response, dt);
             let island = &state.islands[index];
             let (motions, candidates, work) = (&mut state.motions, &mut state.candidates, &mut state.work);
@@ -49,10 +58,9 @@ impl World {
                     counters.implicit_splits = counters.implicit_splits.max(solver.splits);
                 }
                 Response::Auto | Response::Substepped => {
-                    let rates = &mut state.rates;
-                    let taken = substepped::step(motions, island, candidates, dt, &settings, &limits, rates, work);
-                    counters.substeps = counters.substeps.max(taken.substeps);
-                    short = short.max(taken.wanted / f64::from(taken.substeps));
+                    let taken = substepped::step(motions, island, candidates, dt, &settings, &limits, wanted, work);
+                    counters.substeps = counters.substeps.max(taken);
+                    short = short.max(wanted / f64::from(taken));
                 }
             }
             // Kinematic links start every island from the host's pose.
@@ -97,8 +105,9 @@ impl World {
     }
 
     /// The response of an island. What a body or the world forces holds for all that it touches, the most stable first;
-    /// left to itself, implicit is for what is jointed, held by its host, or stacked, and sub-steps for the rest.
-    fn choose(&self, island: &Island, state: &Stepping) -> Response {
+    /// left to itself, implicit is for what is jointed, held by its host, or stacked, and sub-steps for the rest. Also
+    /// whether it is forced.
+    fn choose(&self, island: &Island, state: &Stepping) -> (Response, bool) {
         let movable = |link: &&u32| state.motions[**link as usize].is_movable();
         let links = || island.links.iter().filter(movable).map(|link| &self.links[*link as usize]);
         let forced = |response| {
@@ -109,14 +118,15 @@ impl World {
         };
         for response in [Response::Implicit, Response::Substepped, Response::Explicit] {
             if forced(response) {
-                return response;
+                return (response, true);
             }
         }
         let held = links().any(|link| {
             let host = link.desc.kind == Kind::Host && (link.desc.constrained || link.mirror.is_doubtful());
             host || self.bodies[link.body as usize].stacked > 0
         });
-        if held && !island.candidates.is_empty() { Response::Implicit } else { Response::Substepped }
+        let implicit = held && !island.candidates.is_empty();
+        (if implicit { Response::Implicit } else { Response::Substepped }, false)
     }
 
     /// Gives host-driven links the velocities that a response starts from.
