@@ -2,6 +2,7 @@
 //! too narrow to be found.
 
 use super::pair::{Pair, Sample};
+use crate::field::separation::{gap, separation, touching_point};
 use crate::field::{Shape, skeleton::closest_points};
 use crate::math::{Vec3, tangents};
 
@@ -47,21 +48,8 @@ pub fn approach(pair: &Pair, i: usize, j: usize) -> Approach {
             let distance = a.shape.closest(&on_b).distance;
             (distance, *normal, on_b - normal * distance)
         }
-        _ if (on_b - on_a).norm() > 1e-12 * (on_a.norm() + on_b.norm()) => {
-            let apart = on_b - on_a;
-            (apart.norm(), apart.normalize(), on_a)
-        }
-        // The cores meet: the way out is the shorter of the two to the other's middle.
-        _ => {
-            let (into_a, into_b) = (a.shape.closest(&b.shape.middle()), b.shape.closest(&a.shape.middle()));
-            if into_b.distance >= into_a.distance {
-                (into_b.distance.min(0.0), -into_b.normal, on_a)
-            } else {
-                (into_a.distance.min(0.0), into_a.normal, on_a)
-            }
-        }
+        _ => apart(&a.shape, &b.shape, on_a, on_b),
     };
-    let direction = if direction == Vec3::zeros() { Vec3::z() } else { direction };
     let (ta, tb) = (a.profile.thickness, b.profile.thickness);
     let (sa, sb) = (pair.a.slope(i), pair.b.slope(j));
     let along = if sa.is_infinite() {
@@ -72,6 +60,26 @@ pub fn approach(pair: &Pair, i: usize, j: usize) -> Approach {
         (sa * ta - sb * tb + sb * distance) / (sa + sb)
     };
     Approach { distance, direction, meeting: from + direction * along }
+}
+
+/// Distance and direction of two bounded shapes from a to b, and the point of a that is closest to b. When they meet,
+/// the shortest way out with a negative distance: the closest points say nothing then.
+fn apart(a: &Shape, b: &Shape, on_a: Vec3, on_b: Vec3) -> (f64, Vec3, Vec3) {
+    let (distance, across) = ((on_b - on_a).norm(), on_b - on_a);
+    let direction = across / distance.max(f64::MIN_POSITIVE);
+    let clear = if distance > 0.0 { gap(a, b, &direction) } else { f64::NEG_INFINITY };
+    if clear >= 0.999 * distance {
+        return (distance, direction, on_a);
+    }
+    // They meet, or the search for the closest points stopped short of them.
+    let out = separation(a, b);
+    if out.distance < clear {
+        (distance, direction, on_a)
+    } else if out.distance > 0.0 {
+        (out.distance, out.direction, on_a)
+    } else {
+        (out.distance, out.direction, touching_point(a, b, &out))
+    }
 }
 
 /// Climbs to the deepest point from where two skeletons come closest. `None` when they do not touch.
