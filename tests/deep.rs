@@ -1,12 +1,12 @@
-//! Contacts pressed far into one another: what overlaps is pushed apart.
+//! Contacts pressed far into one another, and contacts on the kinks of a blend: what overlaps is pushed apart.
 
 mod common;
 
-use common::{Coat, Random, box_inertia};
+use common::{Coat, Random, box_inertia, collide, total};
 use isocoat::base::Kind;
 use isocoat::field::Shape;
 use isocoat::math::{Mat3, Pose, Twist, Vec3};
-use isocoat::world::{EventKind, LinkDesc, Response, World, WorldDesc};
+use isocoat::world::{EventKind, LinkDesc, LinkId, LinkState, Response, Scheme, World, WorldDesc};
 
 const THICKNESS: f64 = 0.05;
 
@@ -94,4 +94,101 @@ fn boxes_that_meet_past_their_cores_neither_pass_each_other_nor_gain_energy() {
             assert!(most <= 1.01 * before, "gained energy");
         }
     }
+}
+
+/// A body of two skeletons that blend.
+fn blended(random: &mut Random) -> Coat {
+    let mut one = |offset: f64| {
+        let at = |x: f64, y: f64| Vec3::new(x + offset, y, 0.0);
+        match (4.0 * random.unit()) as usize {
+            0 => Shape::Point(at(0.0, 0.0)),
+            1 => Shape::Segment(at(-0.1, 0.0), at(0.1, 0.0)),
+            2 => Shape::Triangle(at(-0.1, 0.0), at(0.1, 0.0), at(0.0, 0.1)),
+            _ => Shape::Box { center: at(0.0, 0.0), half: Vec3::repeat(0.06), axes: Mat3::identity() },
+        }
+    };
+    let shapes = [one(0.0), one(0.12)];
+    Coat::new(&shapes, 0.1)
+}
+
+#[test]
+fn coming_closer_a_contact_between_blends_does_not_flicker() {
+    let mut random = Random(31);
+    let mut failures = Vec::new();
+    for case in 0..60 {
+        let (a, b) = (blended(&mut random), blended(&mut random));
+        let (turn_a, turn_b) = (random.rotation(), random.rotation());
+        let shift = Vec3::new(random.range(-0.1, 0.1), random.range(-0.1, 0.1), 0.0);
+        let place = |height: f64| {
+            let pose_b = Pose { position: shift + Vec3::z() * height, rotation: turn_b };
+            total(&collide((&a, Pose { rotation: turn_a, ..Pose::default() }), (&b, pose_b), Scheme::Auto, 5e-2))
+        };
+        // From the first touch down by less than one coat: no core is reached.
+        let touch = (0..100).map(|i| 0.6 - 0.005 * f64::from(i)).find(|height| place(*height).norm() > 0.0).unwrap();
+        for step in 0..36 {
+            let height = touch - 0.0025 * f64::from(step);
+            if place(height).norm() == 0.0 {
+                failures.push(format!("case {case}: no force {:.4} below the first touch", touch - height));
+            }
+        }
+    }
+    assert!(failures.is_empty(), "{failures:#?}");
+}
+
+fn energy(world: &World, links: &[(LinkId, f64)]) -> f64 {
+    let of = |(link, mass): &(LinkId, f64)| {
+        let LinkState { twist, .. } = world.link_state(*link).unwrap();
+        // Inertia of a hundredth of the mass, about every axis.
+        0.5 * mass * (twist.linear.norm_squared() + 0.01 * twist.angular.norm_squared())
+    };
+    links.iter().map(of).sum()
+}
+
+#[test]
+fn elastic_impacts_of_blends_keep_their_energy() {
+    let mut worst = 0.0f64;
+    let mut failures = Vec::new();
+    for case in 0..150 {
+        let mut random = Random(case);
+        let mut world = World::new(WorldDesc::default()).unwrap();
+        let speed = random.range(0.8, 1.6);
+        let links: Vec<(LinkId, f64)> = [1.0, -1.0]
+            .into_iter()
+            .map(|side| {
+                let (coat, mass) = (blended(&mut random), random.range(1.0, 4.0));
+                let desc = LinkDesc {
+                    kind: Kind::Rigid,
+                    mass,
+                    inertia: Mat3::identity() * (0.01 * mass),
+                    pose: Pose {
+                        position: Vec3::new(random.range(-0.1, 0.1), 0.0, -0.3 * side),
+                        rotation: random.rotation(),
+                    },
+                    twist: Twist {
+                        linear: Vec3::new(0.0, 0.0, speed * side),
+                        angular: Vec3::from_fn(|_, _| random.range(-2.0, 2.0)),
+                    },
+                    ..LinkDesc::default()
+                };
+                (coat.add(&mut world, coat.body_desc(), desc).1, mass)
+            })
+            .collect();
+        let before = energy(&world, &links);
+        let mut overloaded = false;
+        for _ in 0..60 {
+            world.step(1.0 / 60.0).unwrap();
+            overloaded |= world.events().iter().any(|event| event.kind == EventKind::Overload);
+        }
+        if overloaded || !world.contacts().is_empty() {
+            // The push-out is inelastic; a contact holds back energy.
+            continue;
+        }
+        let change = energy(&world, &links) / before - 1.0;
+        worst = worst.max(change.abs());
+        if change.abs() > 0.02 {
+            failures.push(format!("case {case}: {:.2} %", 100.0 * change));
+        }
+    }
+    println!("elastic impacts of blends: energy off by {:.2} % at most", 100.0 * worst);
+    assert!(failures.is_empty(), "{failures:#?}");
 }

@@ -82,39 +82,64 @@ fn apart(a: &Shape, b: &Shape, on_a: Vec3, on_b: Vec3) -> (f64, Vec3, Vec3) {
     }
 }
 
+/// Most steps of the climb, and of the fall onto the surface after a climb that failed.
+const ROUNDS: usize = 32;
+
+/// One look at the two fields during the climb.
+struct Look {
+    found: Deepest,
+    sample: Sample,
+    /// Way to the surface along the normal, to first order.
+    across: f64,
+}
+
+/// What both fields are at a point, read as if it were on the surface. `None` where there is no normal.
+fn look(pair: &Pair, skeletons: [usize; 2], position: &Vec3) -> Option<Look> {
+    let (sample, hessian) = pair.sample_hessian(position);
+    let normal = sample.normal()?;
+    let across = sample.difference / sample.difference_gradient.norm();
+    let (e1, e2) = tangents(&normal);
+    let reduce = |u: &Vec3, v: &Vec3| u.dot(&(hessian * v));
+    let (axes, curvature) = principal(&e1, &e2, reduce(&e1, &e1), reduce(&e1, &e2), reduce(&e2, &e2));
+    let found = Deepest {
+        position: position + normal * across,
+        normal,
+        axes,
+        curvature,
+        // On the surface the sum is what the first order predicts there.
+        sum: sample.sum + across * sample.sum_gradient.dot(&normal),
+        slope: sample.gradient_a.norm().max(sample.gradient_b.norm()),
+        skeletons,
+        evaluations: 0,
+    };
+    Some(Look { found, sample, across })
+}
+
 /// Climbs to the deepest point from where two skeletons come closest. `None` when they do not touch.
 pub fn find(pair: &Pair, i: usize, j: usize, from: &Approach) -> Option<Deepest> {
-    let mut position = from.meeting;
     let size = pair.a.skeletons[i].profile.thickness.min(pair.b.skeletons[j].profile.thickness);
-    let mut trust = 0.5 * size;
+    let settled = 1e-4 * size;
     let mut evaluations = 0;
+    let mut position = from.meeting;
+    let mut trust = 0.5 * size;
+    let mut last = f64::INFINITY;
     let mut best: Option<Deepest> = None;
-    for _ in 0..24 {
-        let (sample, hessian) = pair.sample_hessian(&position);
+    // The point nearest to the surface that seemed to be in contact, for a climb that never comes to rest.
+    let mut nearest = (f64::INFINITY, from.meeting);
+    for _ in 0..ROUNDS {
         evaluations += 1;
-        let normal = sample.normal()?;
-        let slope = sample.difference_gradient.norm();
-        let across = sample.difference / slope;
-        let (e1, e2) = tangents(&normal);
-        let reduce = |u: &Vec3, v: &Vec3| u.dot(&(hessian * v));
-        let (h11, h12, h22) = (reduce(&e1, &e1), reduce(&e1, &e2), reduce(&e2, &e2));
-        let (axes, curvature) = principal(&e1, &e2, h11, h12, h22);
-        // On the surface the sum is what the first order predicts there.
-        let sum = sample.sum + across * sample.sum_gradient.dot(&normal);
-        let settled = across.abs() <= 1e-4 * size;
-        let found = Deepest {
-            position: position + normal * across,
-            normal,
-            axes,
-            curvature,
-            sum,
-            slope: sample.gradient_a.norm().max(sample.gradient_b.norm()),
-            skeletons: [i, j],
-            evaluations,
-        };
-        if let Some(previous) = &best
-            && settled
-            && sum < previous.sum - 1e-9 * previous.sum.abs()
+        let Some(Look { found, sample, across }) = look(pair, [i, j], &position) else { break };
+        if across.abs() > settled {
+            if found.sum > 0.0 && across.abs() < nearest.0 {
+                nearest = (across.abs(), position);
+            }
+            if across.abs() >= last {
+                // Where the fields have a kink, every step of this length leaves the surface again.
+                trust *= 0.25;
+            }
+            last = across.abs();
+        } else if let Some(previous) = &best
+            && found.sum < previous.sum - 1e-9 * previous.sum.abs()
         {
             // Overshot: go back half way.
             trust *= 0.25;
@@ -125,17 +150,40 @@ pub fn find(pair: &Pair, i: usize, j: usize, from: &Approach) -> Option<Deepest>
             continue;
         }
         let step = climb(&found, &sample, trust);
-        if settled {
+        if across.abs() <= settled {
+            last = f64::INFINITY;
             best = Some(found);
             if step.norm() <= 1e-3 * size {
                 break;
             }
         }
-        position += normal * across.clamp(-2.0 * size, 2.0 * size) + step;
+        position += found.normal * across.clamp(-2.0 * size, 2.0 * size) + step;
+    }
+    if best.is_none_or(|best| best.sum <= 0.0) {
+        let starts = [nearest.1, from.meeting];
+        best = starts.iter().find_map(|start| fall(pair, [i, j], start, size, &mut evaluations));
     }
     let mut found = best?;
     found.evaluations = evaluations;
     (found.sum > 0.0).then_some(found)
+}
+
+/// The surface near a point, without a climb; `None` where it is not found, or not in contact.
+fn fall(pair: &Pair, skeletons: [usize; 2], start: &Vec3, size: f64, evaluations: &mut u32) -> Option<Deepest> {
+    let (mut position, mut stride, mut last) = (*start, 2.0 * size, f64::INFINITY);
+    for _ in 0..ROUNDS {
+        *evaluations += 1;
+        let Look { found, across, .. } = look(pair, skeletons, &position)?;
+        if across.abs() <= 1e-4 * size {
+            return (found.sum > 0.0).then_some(found);
+        }
+        if across.abs() >= last {
+            stride = 0.5 * stride.min(last);
+        }
+        last = across.abs();
+        position += found.normal * across.clamp(-stride, stride);
+    }
+    None
 }
 
 /// Eigenvectors and eigenvalues of the 2×2 matrix of second derivatives in the plane of `e1`, `e2`.
