@@ -2,6 +2,7 @@
 //! too narrow to be found.
 
 use super::pair::{Pair, Sample};
+use crate::field::separation::{gap, separation, touching_point};
 use crate::field::{Shape, skeleton::closest_points};
 use crate::math::{Vec3, tangents};
 
@@ -47,21 +48,8 @@ pub fn approach(pair: &Pair, i: usize, j: usize) -> Approach {
             let distance = a.shape.closest(&on_b).distance;
             (distance, *normal, on_b - normal * distance)
         }
-        _ if (on_b - on_a).norm() > 1e-12 * (on_a.norm() + on_b.norm()) => {
-            let apart = on_b - on_a;
-            (apart.norm(), apart.normalize(), on_a)
-        }
-        // The cores meet: the way out is the shorter of the two to the other's middle.
-        _ => {
-            let (into_a, into_b) = (a.shape.closest(&b.shape.middle()), b.shape.closest(&a.shape.middle()));
-            if into_b.distance >= into_a.distance {
-                (into_b.distance.min(0.0), -into_b.normal, on_a)
-            } else {
-                (into_a.distance.min(0.0), into_a.normal, on_a)
-            }
-        }
+        _ => apart(&a.shape, &b.shape, on_a, on_b),
     };
-    let direction = if direction == Vec3::zeros() { Vec3::z() } else { direction };
     let (ta, tb) = (a.profile.thickness, b.profile.thickness);
     let (sa, sb) = (pair.a.slope(i), pair.b.slope(j));
     let along = if sa.is_infinite() {
@@ -74,39 +62,84 @@ pub fn approach(pair: &Pair, i: usize, j: usize) -> Approach {
     Approach { distance, direction, meeting: from + direction * along }
 }
 
+/// Distance and direction of two bounded shapes from a to b, and the point of a that is closest to b. When they meet,
+/// the shortest way out with a negative distance: the closest points say nothing then.
+fn apart(a: &Shape, b: &Shape, on_a: Vec3, on_b: Vec3) -> (f64, Vec3, Vec3) {
+    let (distance, across) = ((on_b - on_a).norm(), on_b - on_a);
+    let direction = across / distance.max(f64::MIN_POSITIVE);
+    let clear = if distance > 0.0 { gap(a, b, &direction) } else { f64::NEG_INFINITY };
+    if clear >= 0.999 * distance {
+        return (distance, direction, on_a);
+    }
+    // They meet, or the search for the closest points stopped short of them.
+    let out = separation(a, b);
+    if out.distance < clear {
+        (distance, direction, on_a)
+    } else if out.distance > 0.0 {
+        (out.distance, out.direction, on_a)
+    } else {
+        (out.distance, out.direction, touching_point(a, b, &out))
+    }
+}
+
+/// Most steps of the climb, and of the fall onto the surface after a climb that failed.
+const ROUNDS: usize = 32;
+
+/// One look at the two fields during the climb.
+struct Look {
+    found: Deepest,
+    sample: Sample,
+    /// Way to the surface along the normal, to first order.
+    across: f64,
+}
+
+/// What both fields are at a point, read as if it were on the surface. `None` where there is no normal.
+fn look(pair: &Pair, skeletons: [usize; 2], position: &Vec3) -> Option<Look> {
+    let (sample, hessian) = pair.sample_hessian(position);
+    let normal = sample.normal()?;
+    let across = sample.difference / sample.difference_gradient.norm();
+    let (e1, e2) = tangents(&normal);
+    let reduce = |u: &Vec3, v: &Vec3| u.dot(&(hessian * v));
+    let (axes, curvature) = principal(&e1, &e2, reduce(&e1, &e1), reduce(&e1, &e2), reduce(&e2, &e2));
+    let found = Deepest {
+        position: position + normal * across,
+        normal,
+        axes,
+        curvature,
+        // On the surface the sum is what the first order predicts there.
+        sum: sample.sum + across * sample.sum_gradient.dot(&normal),
+        slope: sample.gradient_a.norm().max(sample.gradient_b.norm()),
+        skeletons,
+        evaluations: 0,
+    };
+    Some(Look { found, sample, across })
+}
+
 /// Climbs to the deepest point from where two skeletons come closest. `None` when they do not touch.
 pub fn find(pair: &Pair, i: usize, j: usize, from: &Approach) -> Option<Deepest> {
-    let mut position = from.meeting;
     let size = pair.a.skeletons[i].profile.thickness.min(pair.b.skeletons[j].profile.thickness);
-    let mut trust = 0.5 * size;
+    let settled = 1e-4 * size;
     let mut evaluations = 0;
+    let mut position = from.meeting;
+    let mut trust = 0.5 * size;
+    let mut last = f64::INFINITY;
     let mut best: Option<Deepest> = None;
-    for _ in 0..24 {
-        let (sample, hessian) = pair.sample_hessian(&position);
+    // The point nearest to the surface that seemed to be in contact, for a climb that never comes to rest.
+    let mut nearest = (f64::INFINITY, from.meeting);
+    for _ in 0..ROUNDS {
         evaluations += 1;
-        let normal = sample.normal()?;
-        let slope = sample.difference_gradient.norm();
-        let across = sample.difference / slope;
-        let (e1, e2) = tangents(&normal);
-        let reduce = |u: &Vec3, v: &Vec3| u.dot(&(hessian * v));
-        let (h11, h12, h22) = (reduce(&e1, &e1), reduce(&e1, &e2), reduce(&e2, &e2));
-        let (axes, curvature) = principal(&e1, &e2, h11, h12, h22);
-        // On the surface the sum is what the first order predicts there.
-        let sum = sample.sum + across * sample.sum_gradient.dot(&normal);
-        let settled = across.abs() <= 1e-4 * size;
-        let found = Deepest {
-            position: position + normal * across,
-            normal,
-            axes,
-            curvature,
-            sum,
-            slope: sample.gradient_a.norm().max(sample.gradient_b.norm()),
-            skeletons: [i, j],
-            evaluations,
-        };
-        if let Some(previous) = &best
-            && settled
-            && sum < previous.sum - 1e-9 * previous.sum.abs()
+        let Some(Look { found, sample, across }) = look(pair, [i, j], &position) else { break };
+        if across.abs() > settled {
+            if found.sum > 0.0 && across.abs() < nearest.0 {
+                nearest = (across.abs(), position);
+            }
+            if across.abs() >= last {
+                // Where the fields have a kink, every step of this length leaves the surface again.
+                trust *= 0.25;
+            }
+            last = across.abs();
+        } else if let Some(previous) = &best
+            && found.sum < previous.sum - 1e-9 * previous.sum.abs()
         {
             // Overshot: go back half way.
             trust *= 0.25;
@@ -117,17 +150,40 @@ pub fn find(pair: &Pair, i: usize, j: usize, from: &Approach) -> Option<Deepest>
             continue;
         }
         let step = climb(&found, &sample, trust);
-        if settled {
+        if across.abs() <= settled {
+            last = f64::INFINITY;
             best = Some(found);
             if step.norm() <= 1e-3 * size {
                 break;
             }
         }
-        position += normal * across.clamp(-2.0 * size, 2.0 * size) + step;
+        position += found.normal * across.clamp(-2.0 * size, 2.0 * size) + step;
+    }
+    if best.is_none_or(|best| best.sum <= 0.0) {
+        let starts = [nearest.1, from.meeting];
+        best = starts.iter().find_map(|start| fall(pair, [i, j], start, size, &mut evaluations));
     }
     let mut found = best?;
     found.evaluations = evaluations;
     (found.sum > 0.0).then_some(found)
+}
+
+/// The surface near a point, without a climb; `None` where it is not found, or not in contact.
+fn fall(pair: &Pair, skeletons: [usize; 2], start: &Vec3, size: f64, evaluations: &mut u32) -> Option<Deepest> {
+    let (mut position, mut stride, mut last) = (*start, 2.0 * size, f64::INFINITY);
+    for _ in 0..ROUNDS {
+        *evaluations += 1;
+        let Look { found, across, .. } = look(pair, skeletons, &position)?;
+        if across.abs() <= 1e-4 * size {
+            return (found.sum > 0.0).then_some(found);
+        }
+        if across.abs() >= last {
+            stride = 0.5 * stride.min(last);
+        }
+        last = across.abs();
+        position += found.normal * across.clamp(-stride, stride);
+    }
+    None
 }
 
 /// Eigenvectors and eigenvalues of the 2×2 matrix of second derivatives in the plane of `e1`, `e2`.

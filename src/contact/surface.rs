@@ -63,22 +63,49 @@ pub fn integrate(pair: &Pair, settings: &Settings, out: &mut Surface) {
     out.cells.clear();
     out.outlines.clear();
     out.evaluations = 0;
+    let deepest = find_patches(pair, settings, out);
+    // What overlaps is pushed apart, if not by a pressure then as an overload.
+    if out.nodes.is_empty()
+        && out.overloads.is_empty()
+        && let Some(deepest) = deepest
+    {
+        out.overloads.push(deepest);
+    }
+}
+
+/// Overlaps below this part of the thinner coat may have no pressure left to be found.
+const FAINT: f64 = 1e-6;
+/// The same for seeds, which have gaps between them.
+const FAINT_SEEDED: f64 = 0.5;
+
+/// Finds and integrates the patches. Gives the two skeletons whose coats overlap most.
+fn find_patches(pair: &Pair, settings: &Settings, out: &mut Surface) -> Option<(usize, usize, Approach)> {
+    let mut most = (if settings.scheme == Scheme::Seeds { FAINT_SEEDED } else { FAINT }, None);
     for i in 0..pair.a.skeletons.len() {
         for j in 0..pair.b.skeletons.len() {
             let approach = deepest::approach(pair, i, j);
             if approach.distance >= pair.a.reach[i] + pair.b.reach[j] {
                 continue;
             }
-            if is_overloaded(pair, i, j, &approach) {
+            let (ta, tb) = (pair.a.skeletons[i].profile.thickness, pair.b.skeletons[j].profile.thickness);
+            let overlap = (ta + tb - approach.distance) / ta.min(tb);
+            if overlap > most.0 {
+                most = (overlap, Some((i, j, approach)));
+            }
+            let overloaded = is_overloaded(pair, i, j, &approach);
+            if overloaded {
                 out.overloads.push((i, j, approach));
             }
             let closed = matches!(settings.scheme, Scheme::Auto | Scheme::ClosedForm);
             if closed && closed_patch(pair, &approach, out) {
-                return;
+                return most.1;
             }
             if let Some(found) = deepest::find(pair, i, j, &approach) {
                 out.evaluations += found.evaluations;
                 out.maxima.push(found);
+            } else if !overloaded && approach.distance <= 0.0 {
+                // Core in core, and no surface between them.
+                out.overloads.push((i, j, approach));
             }
         }
     }
@@ -86,7 +113,7 @@ pub fn integrate(pair: &Pair, settings: &Settings, out: &mut Surface) {
     out.maxima.sort_by(|x, y| y.sum.total_cmp(&x.sum));
     if settings.scheme == Scheme::Seeds {
         seeds::integrate(pair, out);
-        return;
+        return most.1;
     }
     let extent = extent(&pair.a).min(extent(&pair.b));
     for index in 0..out.maxima.len() {
@@ -99,9 +126,10 @@ pub fn integrate(pair: &Pair, settings: &Settings, out: &mut Surface) {
             out.patches.clear();
             out.nodes.clear();
             seeds::integrate(pair, out);
-            return;
+            return most.1;
         }
     }
+    most.1
 }
 
 impl Surface {

@@ -6,6 +6,7 @@
 pub mod blend;
 pub mod lanes;
 pub mod profile;
+pub mod separation;
 pub mod skeleton;
 
 pub use profile::Profile;
