@@ -196,6 +196,10 @@ test-install: build
 
 comma := ,
 
+.PHONY: extremes
+extremes: ## all rows of the stability tables, into docs/extremes.md (takes long)
+	$(CARGO) test --release --test extremes -- --ignored --nocapture
+
 .PHONY: bench
 bench: ## measure
 	$(CARGO) bench

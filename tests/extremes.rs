@@ -138,8 +138,9 @@ fn slab(knobs: &Knobs, response: Response) -> Scene {
     }
     let half = Vec3::new(0.5, 0.5, 0.05) * scale;
     let mass = small * 1e4 * knobs.mass_ratio;
-    let coat = Coat::cuboid(half - Vec3::repeat(0.02 * scale), 0.02 * scale).hard();
-    let body = BodyDesc { rigid: true, ..flesh(knobs, 1.0) };
+    // Deformable: two rigid bodies, as the slab and the floor would be, are left to the host.
+    let coat = Coat::cuboid(half - Vec3::repeat(0.02 * scale), 0.02 * scale);
+    let body = flesh(knobs, 100.0);
     scene.add(&coat, body, mass, box_inertia(mass, half), Vec3::new(0.0, 0.0, 0.25) * scale, Twist::default());
     scene
 }
@@ -214,7 +215,7 @@ struct Outcome {
 impl Outcome {
     fn passes(&self, response: Response) -> bool {
         // The sub-steps keep energy to about a per cent a bounce, without trend.
-        let most = if response == Response::Implicit { 1e-3 } else { 0.03 };
+        let most: f64 = if response == Response::Implicit { 1e-3 } else { 0.03 };
         let reported = self.overloads > 0 || self.warned;
         let most = if reported { most.max(0.1) } else { most };
         self.finite && self.gain <= most && !self.escaped
@@ -246,7 +247,7 @@ fn run(build: Build, knobs: &Knobs, response: Response, seconds: f64) -> Outcome
         outcome.overloads += scene.world.events().iter().filter(|e| e.kind == EventKind::Overload).count();
         let energy = scene.energy(knobs.gravity);
         outcome.finite &= energy.is_finite();
-        if !outcome.finite || begin.elapsed().as_secs_f64() > 20.0 {
+        if !outcome.finite || begin.elapsed().as_secs_f64() > 5.0 {
             break;
         }
         outcome.gain = outcome.gain.max((energy - first) / (first.abs() + slight));
@@ -364,8 +365,8 @@ fn the_ends_of_the_sweeps_hold() {
 #[ignore = "takes long; make extremes"]
 fn all_rows() {
     let (text, failures) = table(false);
-    let head = "# Extremes\n\nWritten by `make extremes`: one parameter at a time, 60 Hz and at most 600 steps unless the row \
-                says otherwise. `gain` is the largest kinetic and height energy over the first; a row passes when all is \
+    let head = "# Extremes\n\nWritten by `make extremes`: one parameter at a time, 60 Hz and at most 600 steps, and \
+                at most five seconds of computing, unless the row says otherwise. `gain` is the largest kinetic and height energy over the first; a row passes when all is \
                 finite, the gain is at most 0.1 % (implicit) or 3 % (others), and nothing leaves its place, or an overload \
                 or a warning said so.\n";
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/extremes.md");

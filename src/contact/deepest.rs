@@ -165,7 +165,12 @@ pub fn find(pair: &Pair, i: usize, j: usize, from: &Approach) -> Option<Deepest>
     }
     let mut found = best?;
     found.evaluations = evaluations;
-    (found.sum > 0.0).then_some(found)
+    (found.sum > touch(pair)).then_some(found)
+}
+
+/// The least `σ` that counts: a touch shallower than what rounding makes of the fields has no surface to integrate.
+fn touch(pair: &Pair) -> f64 {
+    1e-12 * (pair.a.isovalue + pair.b.isovalue)
 }
 
 /// The surface near a point, without a climb; `None` where it is not found, or not in contact.
@@ -175,7 +180,7 @@ fn fall(pair: &Pair, skeletons: [usize; 2], start: &Vec3, size: f64, evaluations
         *evaluations += 1;
         let Look { found, across, .. } = look(pair, skeletons, &position)?;
         if across.abs() <= 1e-4 * size {
-            return (found.sum > 0.0).then_some(found);
+            return (found.sum > touch(pair)).then_some(found);
         }
         if across.abs() >= last {
             stride = 0.5 * stride.min(last);

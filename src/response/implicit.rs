@@ -42,6 +42,9 @@ const LET_GO: f64 = 5.0;
 /// Part of a bristle's bend that is taken back in one step.
 const RECOVERY: f64 = 0.2;
 
+/// Stiffness of a wall, over what would take up a mass within a step.
+const WALL: f64 = 1e3;
+
 /// Part of the speeds of a step below which a change between two rounds does not matter.
 const NEGLIGIBLE: f64 = 1e-4;
 
@@ -58,6 +61,8 @@ pub struct Solver {
     x: Vec<f64>,
     rows: Vec<Row>,
     carriers: Carriers,
+    /// The surfaces are frozen where they are.
+    last_resort: bool,
     pushes: Vec<Push>,
     /// Rounds of the last step, all halves together.
     pub rounds: u32,
@@ -205,9 +210,11 @@ impl Solver {
             if !last_resort {
                 return false;
             }
-            // One solve with the surfaces as they are now: what moves on is small in so short a step.
+            // One solve with the surfaces as they are now: what moves on is small in so short a step, and no gap closes.
             self.x.fill(0.0);
+            self.last_resort = true;
             self.look(motions, island, candidates, h, settings, work);
+            self.last_resort = false;
             self.coupled.solve(&mut self.x, &self.free, motions, h);
         }
         self.commit(motions, island, candidates, h);
@@ -336,17 +343,25 @@ impl Solver {
                 self.add_group(index, Some(number), sums.center, points, members, candidate, grip);
             }
         }
-        // Gaps that may close, so that the next round starts from a shallow touch; and what must come apart.
+        // What must come apart, from where the step began.
         for (i, j, approach) in &surface.overloads {
-            let thickness = pair.a.skeletons[*i].profile.thickness.min(pair.b.skeletons[*j].profile.thickness);
-            self.add_stop(candidate, index, [*i, *j], approach, PUSH_OUT * thickness * h, h);
+            self.carriers.find(pair, &approach.meeting);
+            let come = self.closing(pair, approach) * h;
+            self.add_wall(candidate, index, [*i, *j], approach, -PUSH_OUT * thinner(pair, *i, *j) * h - come, h);
         }
-        if surface.patches.is_empty() && surface.overloads.is_empty() {
-            for (i, j) in combinations(pair) {
-                let approach = deepest::approach(pair, i, j);
-                // A touch without depth has no patch yet.
-                let gap = (approach.distance - thicknesses(pair, i, j)).max(0.0);
-                self.add_gap(candidate, index, [i, j], &approach, gap);
+        if !surface.overloads.is_empty() {
+            return;
+        }
+        for (i, j) in combinations(pair) {
+            let approach = deepest::approach(pair, i, j);
+            let gap = approach.distance - thicknesses(pair, i, j);
+            if self.last_resort {
+                // Nothing comes deeper than a coat bears, whatever its speed.
+                self.add_wall(candidate, index, [i, j], &approach, (gap + 0.5 * thinner(pair, i, j)).max(0.0), h);
+            } else if surface.patches.is_empty() {
+                // A gap that may close, so that the next round starts from a shallow touch; one without depth has no
+                // patch yet.
+                self.add_gap(candidate, index, [i, j], &approach, gap.max(0.0));
             }
         }
     }
@@ -358,7 +373,7 @@ impl Solver {
             return Grip::default();
         }
         let [i, j] = patch.skeletons;
-        let thickness = pair.a.skeletons[i].profile.thickness.min(pair.b.skeletons[j].profile.thickness);
+        let thickness = thinner(pair, i, j);
         let key = [pair.a.ids[i], pair.b.ids[j]];
         let mut grip = Grip {
             coefficient: material.friction,
@@ -429,32 +444,27 @@ impl Solver {
         approach: &deepest::Approach,
         gap: f64,
     ) {
-        let pair = &candidate.pair;
-        let thickness = pair.a.skeletons[i].profile.thickness.min(pair.b.skeletons[j].profile.thickness);
-        let stiffness = reachable(pair, i, j, 0.1 * thickness).stiffness;
+        let stiffness = reachable(&candidate.pair, i, j, 0.1 * thinner(&candidate.pair, i, j)).stiffness;
         self.add_lone(candidate, index, approach, -stiffness * gap, stiffness);
     }
 
-    /// A wall that parts what is pressed together past the most it can carry: `apart` metres in this step.
-    fn add_stop(
+    /// A wall beyond which two skeletons come no closer than `room` metres from where they are; negative room parts them.
+    fn add_wall(
         &mut self,
         candidate: &Candidate,
         index: u32,
         [i, j]: [usize; 2],
         approach: &deepest::Approach,
-        apart: f64,
+        room: f64,
         h: f64,
     ) {
         let pair = &candidate.pair;
-        let members = self.members(pair, &approach.meeting);
-        self.coupled.members.truncate(members.0);
+        self.carriers.find(pair, &approach.meeting);
         let mobility = self.carriers.mobility(&self.trial, &pair.origin, &approach.meeting);
         let along = approach.direction.dot(&(mobility * approach.direction));
         if along > 0.0 {
-            let bound = reachable(pair, i, j, f64::INFINITY).stiffness;
-            let stiffness = (1e3 / (along * h * h)).max(bound);
-            let base = self.closing(pair, approach) * h;
-            self.add_lone(candidate, index, approach, stiffness * (apart + base), stiffness);
+            let stiffness = (WALL / (along * h * h)).max(reachable(pair, i, j, f64::INFINITY).stiffness);
+            self.add_lone(candidate, index, approach, -stiffness * room, stiffness);
         }
     }
 
@@ -574,7 +584,7 @@ impl Solver {
             let [i, j] = patch.skeletons;
             let key = [pair.a.ids[i], pair.b.ids[j]];
             let Some(bristle) = memory.bristles.iter_mut().find(|bristle| bristle.key == key) else { continue };
-            let thickness = pair.a.skeletons[i].profile.thickness.min(pair.b.skeletons[j].profile.thickness);
+            let thickness = thinner(pair, i, j);
             self.carriers.find(pair, &load.center);
             let normal = load.force.normalize();
             let slip = self.carriers.slip(motions, &pair.origin, &load.center);
@@ -615,6 +625,10 @@ fn patch_sums(groups: &[Group], pushes: &[Push], points: &[Point]) -> Sums {
 fn combinations(pair: &Pair) -> impl Iterator<Item = (usize, usize)> + use<> {
     let (a, b) = (pair.a.skeletons.len(), pair.b.skeletons.len());
     (0..a).flat_map(move |i| (0..b).map(move |j| (i, j)))
+}
+
+fn thinner(pair: &Pair, i: usize, j: usize) -> f64 {
+    pair.a.skeletons[i].profile.thickness.min(pair.b.skeletons[j].profile.thickness)
 }
 
 fn thicknesses(pair: &Pair, i: usize, j: usize) -> f64 {
