@@ -46,11 +46,11 @@ pub(crate) fn require(what: &'static str, value: f64, range: &'static str, ok: i
     if value.is_finite() && ok(value) { Ok(()) } else { Err(out_of_range(what, value, range)) }
 }
 
-/// Accepts a vector of finite numbers.
+/// Accepts a vector of finite numbers whose powers are finite too.
 pub(crate) fn require_finite(what: &'static str, v: &crate::math::Vec3) -> Result<()> {
-    if crate::math::is_finite(v) {
+    if v.iter().all(|x| x.abs() <= 1e60) {
         Ok(())
     } else {
-        Err(out_of_range(what, format_args!("({}, {}, {})", v.x, v.y, v.z), "finite"))
+        Err(out_of_range(what, format_args!("({}, {}, {})", v.x, v.y, v.z), "finite, at most 1e60"))
     }
 }

@@ -1,6 +1,7 @@
 //! Storage behind handles: a slot table whose ids stay invalid for ever once their object is destroyed.
 
 use std::marker::PhantomData;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use crate::error::{Error, Result, out_of_range};
 
@@ -185,11 +186,6 @@ impl<T: Noun> Arena<T> {
         Ok(&mut self[id.index()])
     }
 
-    /// The tag of the world.
-    pub fn world(&self) -> u16 {
-        self.world
-    }
-
     /// Gives the objects to a world: handles with its tag now stand for them, others no longer do.
     pub fn set_world(&mut self, world: u16) {
         self.world = world;
@@ -250,9 +246,63 @@ impl<T> std::ops::IndexMut<usize> for Arena<T> {
     }
 }
 
+/// The tag that tells one world's handles from those of all others that live: with it, the only process-wide state.
+#[derive(Debug)]
+pub(crate) struct WorldTag(u16);
+
+struct Tags {
+    /// A bit a tag.
+    live: [u64; 1024],
+    /// Where the search for a free one begins, so that a tag rests as long as possible.
+    next: u16,
+}
+
+static TAGS: Mutex<Tags> = Mutex::new(Tags { live: [0; 1024], next: 1 });
+
+fn tags() -> MutexGuard<'static, Tags> {
+    // Nothing panics while the lock is held.
+    TAGS.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl WorldTag {
+    /// Takes a tag that no living world has.
+    pub fn take() -> Result<Self> {
+        let mut tags = tags();
+        for step in 0..=u16::MAX {
+            let tag = tags.next.wrapping_add(step);
+            let (word, bit) = (usize::from(tag / 64), 1 << (tag % 64));
+            if tag != 0 && tags.live[word] & bit == 0 {
+                tags.live[word] |= bit;
+                tags.next = tag.wrapping_add(1);
+                return Ok(Self(tag));
+            }
+        }
+        Err(Error::Capacity("65535 worlds live already"))
+    }
+
+    /// The tag as it stands in handles.
+    pub fn number(&self) -> u16 {
+        self.0
+    }
+}
+
+impl Drop for WorldTag {
+    fn drop(&mut self) {
+        tags().live[usize::from(self.0 / 64)] &= !(1 << (self.0 % 64));
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn no_two_living_worlds_share_a_tag() {
+        let held = WorldTag::take().unwrap();
+        for _ in 0..70_000 {
+            assert_ne!(WorldTag::take().unwrap().number(), held.number());
+        }
+    }
 
     impl Noun for u8 {
         const NAME: &'static str = "byte";

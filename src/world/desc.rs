@@ -247,12 +247,16 @@ impl LinkDesc {
         require_finite("external_angular_acceleration", &self.external_angular_acceleration)?;
         match self.kind {
             Kind::Fixed => return Ok(()),
-            Kind::Host => require("mass of a host-driven link", self.mass, "0 (kinematic) or > 0", |x| x >= 0.0)?,
+            Kind::Host => {
+                require("mass of a host-driven link", self.mass, "0 (kinematic) or > 0, from 1e-60 to 1e60", |x| {
+                    x == 0.0 || sane(x)
+                })?
+            }
             Kind::PointMass => {
-                require("mass of a point mass", self.mass, "> 0", |x| x > 0.0)?;
+                require("mass of a point mass", self.mass, MASS, sane)?;
                 return require_at_origin(&self.local_center);
             }
-            Kind::Rigid => require("mass of a rigid link", self.mass, "> 0", |x| x > 0.0)?,
+            Kind::Rigid => require("mass of a rigid link", self.mass, MASS, sane)?,
         }
         if self.mass > 0.0 {
             validate_inertia(&self.inertia)?;
@@ -269,6 +273,13 @@ impl LinkDesc {
         }
         Ok(())
     }
+}
+
+/// Range of masses and moments: their powers are numbers too.
+const MASS: &str = "> 0, from 1e-60 to 1e60";
+
+fn sane(x: f64) -> bool {
+    (1e-60..=1e60).contains(&x)
 }
 
 fn require_at_origin(center: &Vec3) -> Result<()> {
@@ -293,7 +304,7 @@ fn validate_inertia(inertia: &Mat3) -> Result<()> {
     }
     let mut moments = inertia.symmetric_eigenvalues();
     moments.as_mut_slice().sort_by(f64::total_cmp);
-    if moments[0] <= 0.0 || moments[2] > (moments[0] + moments[1]) * (1.0 + 1e-6) {
+    if !sane(moments[0]) || !sane(moments[2]) || moments[2] > (moments[0] + moments[1]) * (1.0 + 1e-6) {
         return refuse(format!("of principal moments {}, {}, {}", moments[0], moments[1], moments[2]));
     }
     Ok(())

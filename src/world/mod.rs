@@ -14,9 +14,7 @@ mod snapshot;
 mod step;
 mod units;
 
-use std::sync::atomic::{AtomicU16, Ordering};
-
-use crate::handle::{Arena, Noun};
+use crate::handle::{Arena, Noun, WorldTag};
 pub use desc::{
     BodyDesc, BodyId, LinkDesc, LinkId, Response, Scheme, SkeletonDesc, SkeletonId, StiffnessRule, VelocityConvention,
     WorldDesc,
@@ -112,6 +110,7 @@ pub struct World {
     desc: WorldDesc,
     /// Which handles are this world's, told apart in all processes: see [`World::restore`].
     origin: u64,
+    own_tag: WorldTag,
     bodies: Arena<Body>,
     links: Arena<Link>,
     skeletons: Arena<Skeleton>,
@@ -120,25 +119,15 @@ pub struct World {
     stepping: step::Stepping,
 }
 
-/// The tag that tells one world's handles from another's: the only process-wide state.
-static NEXT_WORLD: AtomicU16 = AtomicU16::new(1);
-
-fn next_world_tag() -> u16 {
-    loop {
-        let tag = NEXT_WORLD.fetch_add(1, Ordering::Relaxed);
-        if tag != 0 {
-            return tag;
-        }
-    }
-}
-
 /// Lives, descriptors.
 impl World {
     /// Creates an empty world.
     pub fn new(desc: WorldDesc) -> Result<Self> {
         desc.validate()?;
-        let tag = next_world_tag();
+        let own_tag = WorldTag::take()?;
+        let tag = own_tag.number();
         Ok(Self {
+            own_tag,
             desc,
             origin: snapshot::new_origin(),
             bodies: Arena::new(tag),
@@ -315,6 +304,7 @@ impl World {
         let link = self.links.get_mut(id)?;
         if desc.kind != link.desc.kind {
             link.mirror = Mirror::default();
+            (link.applied_force, link.applied_impulse) = (Wrench::default(), Wrench::default());
         }
         link.desc = desc;
         let body = link.body as usize;
@@ -442,6 +432,16 @@ impl World {
     }
 }
 
+/// Adds to what is to act in the coming step, as long as the sum is a number.
+fn add_push(what: &'static str, sum: &mut Wrench, push: &Wrench) -> Result<()> {
+    let mut total = *sum;
+    total.add_scaled(push, 1.0);
+    require_finite(what, &total.force)?;
+    require_finite(what, &total.torque)?;
+    *sum = total;
+    Ok(())
+}
+
 fn check_plane(desc: &SkeletonDesc, kind: Kind) -> Result<()> {
     if matches!(desc.shape, crate::field::Shape::Plane { .. }) && kind != Kind::Fixed {
         return Err(Error::Unsupported("a plane is for fixed links: it has no bounds to move"));
@@ -496,29 +496,29 @@ impl World {
     /// Adds a force for the coming step, at a point of the world, or at the centre of mass.
     pub fn apply_force(&mut self, id: LinkId, force: &Vec3, point: Option<&Vec3>) -> Result<()> {
         let arm = self.check_push(id, "force", force, point)?;
-        self.links.get_mut(id)?.applied_force.add_force_at(force, &arm);
-        Ok(())
+        let link = self.links.get_mut(id)?;
+        add_push("force", &mut link.applied_force, &Wrench { force: *force, torque: arm.cross(force) })
     }
 
     /// Adds a torque for the coming step.
     pub fn apply_torque(&mut self, id: LinkId, torque: &Vec3) -> Result<()> {
         self.check_push(id, "torque", torque, None)?;
-        self.links.get_mut(id)?.applied_force.torque += torque;
-        Ok(())
+        let link = self.links.get_mut(id)?;
+        add_push("torque", &mut link.applied_force, &Wrench { force: Vec3::zeros(), torque: *torque })
     }
 
     /// Adds an impulse at the start of the coming step, at a point of the world, or at the centre of mass.
     pub fn apply_impulse(&mut self, id: LinkId, impulse: &Vec3, point: Option<&Vec3>) -> Result<()> {
         let arm = self.check_push(id, "impulse", impulse, point)?;
-        self.links.get_mut(id)?.applied_impulse.add_force_at(impulse, &arm);
-        Ok(())
+        let link = self.links.get_mut(id)?;
+        add_push("impulse", &mut link.applied_impulse, &Wrench { force: *impulse, torque: arm.cross(impulse) })
     }
 
     /// Adds an angular impulse at the start of the coming step.
     pub fn apply_angular_impulse(&mut self, id: LinkId, impulse: &Vec3) -> Result<()> {
         self.check_push(id, "angular impulse", impulse, None)?;
-        self.links.get_mut(id)?.applied_impulse.torque += impulse;
-        Ok(())
+        let link = self.links.get_mut(id)?;
+        add_push("angular impulse", &mut link.applied_impulse, &Wrench { force: Vec3::zeros(), torque: *impulse })
     }
 
     /// Checks a push and gives its lever arm from the centre of mass.

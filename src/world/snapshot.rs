@@ -17,8 +17,8 @@ use std::hash::{BuildHasher, RandomState};
 
 use super::bytes::{Counter, Cursor, Lasting, Reader, Sink, enums, structs, write_list};
 use super::{
-    Body, BodyDesc, Link, LinkDesc, Skeleton, SkeletonDesc, StiffnessRule, World, WorldDesc, check_plane, desc,
-    next_world_tag, step, units::Said,
+    Body, BodyDesc, Link, LinkDesc, Skeleton, SkeletonDesc, StiffnessRule, World, WorldDesc, check_plane, desc, step,
+    units::Said,
 };
 use crate::base::Kind;
 use crate::contact::Scheme;
@@ -26,7 +26,7 @@ use crate::contact::candidate::Memory;
 use crate::contact::friction::Bristle;
 use crate::error::{Error, Result, require, require_finite};
 use crate::field::{Profile, Shape};
-use crate::handle::{Arena, Noun, RawId, Slot};
+use crate::handle::{Arena, Noun, RawId, Slot, WorldTag};
 use crate::math::{Pose, Twist, Wrench};
 use crate::response::mirror::Mirror;
 use crate::response::{Response, VelocityConvention};
@@ -249,7 +249,7 @@ impl World {
     }
 
     fn write(&self, out: &mut impl Sink) {
-        let Self { desc, origin, bodies, links, skeletons, log: _, pair_filter: _, stepping } = self;
+        let Self { desc, origin, own_tag: _, bodies, links, skeletons, log: _, pair_filter: _, stepping } = self;
         origin.write(out);
         desc.write(out);
         write_arena(bodies, out);
@@ -273,6 +273,8 @@ impl World {
         let mut from = open(snapshot)?;
         let mut fresh = World {
             origin: from.read("origin")?,
+            // For a world of another origin; otherwise it goes back at once.
+            own_tag: WorldTag::take()?,
             desc: from.read("settings")?,
             bodies: read_arena(&mut from)?,
             links: read_arena(&mut from)?,
@@ -295,11 +297,12 @@ impl World {
             fresh.bodies.go_on_from(&self.bodies);
             fresh.links.go_on_from(&self.links);
             fresh.skeletons.go_on_from(&self.skeletons);
-            self.bodies.world()
+            self.own_tag.number()
         } else {
             // Of the same origin are only those snapshots that this world takes from now on.
             fresh.origin = new_origin();
-            next_world_tag()
+            std::mem::swap(&mut self.own_tag, &mut fresh.own_tag);
+            self.own_tag.number()
         };
         fresh.bodies.set_world(tag);
         fresh.links.set_world(tag);
@@ -308,7 +311,7 @@ impl World {
             id.world = tag;
         }
         fresh.take_rays_of(self);
-        let World { desc, origin, bodies, links, skeletons, log: _, pair_filter: _, stepping: _ } = fresh;
+        let World { desc, origin, own_tag: _, bodies, links, skeletons, log: _, pair_filter: _, stepping: _ } = fresh;
         (self.desc, self.origin) = (desc, origin);
         (self.bodies, self.links, self.skeletons) = (bodies, links, skeletons);
         self.stepping.restart(memories);

@@ -108,7 +108,7 @@ impl World {
     /// Advances the world by `dt` seconds: links that the library moves are moved; for host-driven ones the impulses
     /// are worked out that the host is to apply before it advances by the same `dt`.
     pub fn step(&mut self, dt: f64) -> Result<()> {
-        require("dt", dt, "> 0 and at most 10 s", |x| x > 0.0 && x <= 10.0)?;
+        require("dt", dt, "> 0 and at most 10 s (and at least 1e-12 s)", |x| (1e-12..=10.0).contains(&x))?;
         let mut state = std::mem::take(&mut self.stepping);
         self.begin(&mut state, dt);
         self.find_candidates(&mut state, dt);

@@ -130,6 +130,8 @@ static void links(void)
     LINK(ISOCOAT_LINK_POINT_MASS, local_center_of_mass[1], 0.5, range,
          "local_center_of_mass of a point mass is (0, 0.5, 0)");
     LINK(ISOCOAT_LINK_RIGID, mass, 0.0, range, "mass of a rigid link is 0; must be > 0");
+    LINK(ISOCOAT_LINK_RIGID, mass, 1e-320, range, "mass of a rigid link is");
+    LINK(ISOCOAT_LINK_RIGID, angular_velocity[1], 1e300, range, "angular_velocity is (0, 1");
     LINK(ISOCOAT_LINK_RIGID, inertia[0], NAN, range, "inertia is not finite");
     LINK(ISOCOAT_LINK_RIGID, inertia[1], 0.001, range,
          "inertia is not symmetric; must be symmetric and positive definite");
