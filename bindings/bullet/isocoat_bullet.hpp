@@ -28,6 +28,8 @@
 //            while bodies touch.
 // Core       A coat does not replace the body's shape. Filter the shapes against those of coat partners
 //            (add_coated_body or ignore_core), let them collide with the plain world, and see enable_ccd.
+// Held       Every tick the coupler sees which bodies are held: by enabled constraints, and by contacts of their shapes.
+//            isocoat solves what these touch implicitly: it rests soundly, and bounces less than free bodies do.
 // Sleep      Bodies that touch through their coats fall asleep together. A sleeping body keeps its coat: it is pressed
 //            and presses back, but stays where it is. It wakes when what the coat asks of it changes: a new push, or
 //            support that goes away. A pile at rest stays asleep. While everything sleeps, the isocoat world is
@@ -128,7 +130,6 @@ struct response {
     btVector3 linear_factor{1, 1, 1};
     btVector3 angular_factor{1, 1, 1};
     bool gyroscopic = false;
-    bool jointed = false;
 
     static response of(const btRigidBody &body) {
         constexpr int gyroscopic_flags = BT_ENABLE_GYROSCOPIC_FORCE_EXPLICIT |
@@ -142,23 +143,26 @@ struct response {
         out.linear_factor = body.getLinearFactor();
         out.angular_factor = body.getAngularFactor();
         out.gyroscopic = (body.getFlags() & gyroscopic_flags) != 0;
-        out.jointed = body.getNumConstraintRefs() > 0;
         return out;
     }
 
     bool operator==(const response &other) const {
         return fixed == other.fixed && kinematic == other.kinematic && inverse_mass == other.inverse_mass &&
                inverse_inertia == other.inverse_inertia && linear_factor == other.linear_factor &&
-               angular_factor == other.angular_factor && gyroscopic == other.gyroscopic && jointed == other.jointed;
+               angular_factor == other.angular_factor && gyroscopic == other.gyroscopic;
     }
 
     bool is_dynamic() const { return !fixed && !kinematic; }
 
     /// It moves and turns freely, as a solid of its mass and inertia does.
     bool is_free() const {
+        return linear_factor == btVector3(1, 1, 1) && angular_factor == btVector3(1, 1, 1) && has_inertia();
+    }
+
+    /// Its moments of inertia are those of a solid.
+    bool has_inertia() const {
         const btVector3 &inverse = inverse_inertia;
-        if (linear_factor != btVector3(1, 1, 1) || angular_factor != btVector3(1, 1, 1) ||
-            !(inverse.x() > 0 && inverse.y() > 0 && inverse.z() > 0)) {
+        if (!(inverse.x() > 0 && inverse.y() > 0 && inverse.z() > 0)) {
             return false;
         }
         double moments[3] = {1.0 / double(inverse.x()), 1.0 / double(inverse.y()), 1.0 / double(inverse.z())};
@@ -182,18 +186,20 @@ struct response {
         return out;
     }
 
-    void describe(const btMatrix3x3 &rotation, isocoat_link_desc &desc) const {
+    /// What is `held` by more than its factors is described without them: no matrix says the whole of it, and isocoat
+    /// estimates what holds links that have none.
+    void describe(const btMatrix3x3 &rotation, bool held, isocoat_link_desc &desc) const {
         desc.kind = fixed ? ISOCOAT_LINK_FIXED : ISOCOAT_LINK_HOST;
         desc.mass = is_dynamic() ? 1.0 / double(inverse_mass) : 0.0;
         std::fill(desc.local_center_of_mass, desc.local_center_of_mass + 3, 0.0);
         std::fill(desc.inertia, desc.inertia + 9, 0.0);
         desc.gravity_scale = 0.0;
         desc.velocity_convention = ISOCOAT_VELOCITY_LEAPFROG;
-        desc.flags = (gyroscopic ? ISOCOAT_LINK_HOST_GYROSCOPIC : 0) | (jointed ? ISOCOAT_LINK_CONSTRAINED : 0);
+        desc.flags = (gyroscopic ? ISOCOAT_LINK_HOST_GYROSCOPIC : 0) | (held ? ISOCOAT_LINK_CONSTRAINED : 0);
         if (!is_dynamic()) {
             return;
         }
-        if (is_free()) {
+        if (is_free() || (held && has_inertia())) {
             for (int axis = 0; axis < 3; ++axis) {
                 desc.inertia[4 * axis] = 1.0 / double(inverse_inertia[axis]);
             }
@@ -248,7 +254,7 @@ inline isocoat_link_desc link_desc_from(const btRigidBody &body) {
     desc.pose = detail::pose_from(body.getWorldTransform());
     detail::copy(body.getLinearVelocity(), desc.linear_velocity);
     detail::copy(body.getAngularVelocity(), desc.angular_velocity);
-    detail::response::of(body).describe(body.getWorldTransform().getBasis(), desc);
+    detail::response::of(body).describe(body.getWorldTransform().getBasis(), false, desc);
     return desc;
 }
 
@@ -449,6 +455,9 @@ private:
         bool present = true;
         /// The contact history is to be forgotten.
         bool jumped = true;
+        /// Ticks for which it counts as held still, and whether isocoat was told so.
+        int held = 0;
+        bool constrained = false;
         bool asleep = false;
         /// Ticks that it has slept.
         unsigned slept = 0;
@@ -467,6 +476,9 @@ private:
         std::size_t root = 0;
         bool busy = false;
     };
+
+    /// A contact that rattles comes and goes from tick to tick: a body counts as held for some ticks more.
+    static constexpr int held_ticks = 6;
 
     static bool same(isocoat_link a, isocoat_link b) {
         return a.index == b.index && a.generation == b.generation && a.world == b.world;
@@ -509,7 +521,7 @@ private:
         std::copy(body.linear_velocity, body.linear_velocity + 3, desc.linear_velocity);
         std::copy(body.angular_velocity, body.angular_velocity + 3, desc.angular_velocity);
         const detail::response response = detail::response::of(*entry.body);
-        response.describe(entry.body->getWorldTransform().getBasis(), desc);
+        response.describe(entry.body->getWorldTransform().getBasis(), entry.constrained, desc);
         detail::check(isocoat_link_set_desc(world_, entry.link, &desc), "attach");
         entry.response = response;
         entry.basis = entry.body->getWorldTransform().getBasis();
@@ -522,6 +534,7 @@ private:
             return;
         }
         find_present();
+        notice_held();
         gather(dt);
         if (!push_states()) {
             drop_stale_links();
@@ -546,6 +559,50 @@ private:
             if (found != of_body_.end()) {
                 found_[found->second] = 1;
             }
+        }
+    }
+
+    /// Which bodies constraints or contacts of Bullet's own hold in this tick.
+    void notice_held() {
+        for (attachment &entry : entries_) {
+            entry.held = std::max(entry.held - 1, 0);
+        }
+        // All constraints of the world: a body lists those only that switch off collisions between their bodies.
+        for (int i = 0; i < dynamics_->getNumConstraints(); ++i) {
+            btTypedConstraint &constraint = *dynamics_->getConstraint(i);
+            if (constraint.isEnabled()) {
+                hold(&constraint.getRigidBodyA());
+                hold(&constraint.getRigidBodyB());
+            }
+        }
+        btDispatcher &dispatcher = *dynamics_->getDispatcher();
+        for (int i = 0; i < dispatcher.getNumManifolds(); ++i) {
+            const btPersistentManifold &manifold = *dispatcher.getManifoldByIndexInternal(i);
+            if (presses(manifold)) {
+                hold(manifold.getBody0());
+                hold(manifold.getBody1());
+            }
+        }
+    }
+
+    /// Pairs whose coats touch have no manifold, because their shapes do not collide.
+    static bool presses(const btPersistentManifold &manifold) {
+        if (!manifold.getBody0()->hasContactResponse() || !manifold.getBody1()->hasContactResponse()) {
+            return false;
+        }
+        for (int i = 0; i < manifold.getNumContacts(); ++i) {
+            const btManifoldPoint &point = manifold.getContactPoint(i);
+            if (point.getDistance() <= 0 || point.getAppliedImpulse() > 0) {
+                return true;
+            }
+        }
+        return false;
+    }
+
+    void hold(const btCollisionObject *object) {
+        const auto found = of_body_.find(object);
+        if (found != of_body_.end()) {
+            entries_[found->second].held = held_ticks;
         }
     }
 
@@ -585,8 +642,14 @@ private:
         const detail::response now = detail::response::of(body);
         // The matrix of a body that is held in some direction turns with it.
         const bool turned = now.is_dynamic() && !now.is_free() && !(body.getWorldTransform().getBasis() == entry.basis);
-        if (turned || !(now == entry.response)) {
+        const bool constrained = entry.held > 0 && now.is_dynamic();
+        const bool changed = constrained != entry.constrained;
+        entry.constrained = constrained;
+        if (turned || !(now == entry.response) || (changed && !now.is_free())) {
             describe_again(entry, now);
+        } else if (changed) {
+            // A link that is gone shows in push_states.
+            (void)(isocoat_link_set_constrained(world_, entry.link, constrained) == ISOCOAT_OK);
         }
         btTransform pose = body.getWorldTransform();
         entry.told = detail::motion{body.getLinearVelocity(), body.getAngularVelocity()};
@@ -619,7 +682,7 @@ private:
         if (isocoat_link_get_desc(world_, entry.link, &desc) != ISOCOAT_OK) {
             return;
         }
-        now.describe(entry.body->getWorldTransform().getBasis(), desc);
+        now.describe(entry.body->getWorldTransform().getBasis(), entry.constrained, desc);
         if (isocoat_link_set_desc(world_, entry.link, &desc) == ISOCOAT_OK) {
             entry.response = now;
             entry.basis = entry.body->getWorldTransform().getBasis();
