@@ -374,7 +374,7 @@ public:
         if (body == nullptr || is_attached(body)) {
             throw std::runtime_error(body ? "isocoat: the body is attached already" : "isocoat: the body is NULL");
         }
-        if (position_of(link) < entries_.size()) {
+        if (has_link(link)) {
             throw std::runtime_error("isocoat: the link is attached to another body");
         }
         attachment fresh;
@@ -444,6 +444,30 @@ public:
     /// Sets who is told about errors in ticks, as they happen. It must not change the coupler.
     void on_error(std::function<void(const std::string &)> callback) { on_error_ = std::move(callback); }
 
+protected:
+    /// For couplers that tie links to more than rigid bodies: what they tell isocoat before a step, and what they take
+    /// from it afterwards.
+    virtual void before_step(btScalar) {}
+    virtual void after_step(btScalar) {}
+    virtual bool has_link(isocoat_link link) const { return position_of(link) < entries_.size(); }
+
+    isocoat_world *coats() const { return world_; }
+
+    static bool same(isocoat_link a, isocoat_link b) {
+        return a.index == b.index && a.generation == b.generation && a.world == b.world;
+    }
+
+    void report(const std::string &text) noexcept {
+        try {
+            error_ = text;
+            if (on_error_) {
+                on_error_(error_);
+            }
+        } catch (...) {
+            // An exception must not pass through Bullet; the text is kept.
+        }
+    }
+
 private:
     struct attachment {
         btRigidBody *body = nullptr;
@@ -480,10 +504,6 @@ private:
     /// A contact that rattles comes and goes from tick to tick: a body counts as held for some ticks more.
     static constexpr int held_ticks = 6;
 
-    static bool same(isocoat_link a, isocoat_link b) {
-        return a.index == b.index && a.generation == b.generation && a.world == b.world;
-    }
-
     std::size_t find(const btRigidBody *body) const {
         const auto found = of_body_.find(body);
         if (found == of_body_.end()) {
@@ -498,17 +518,6 @@ private:
         for (std::size_t i = 0; i < entries_.size(); ++i) {
             of_body_[entries_[i].body] = i;
             of_link_[entries_[i].link.index] = i;
-        }
-    }
-
-    void report(const std::string &text) noexcept {
-        try {
-            error_ = text;
-            if (on_error_) {
-                on_error_(error_);
-            }
-        } catch (...) {
-            // An exception must not pass through Bullet; the text is kept.
         }
     }
 
@@ -545,8 +554,10 @@ private:
         if (rests()) {
             return;
         }
+        before_step(dt);
         detail::check(isocoat_world_step(world_, double(dt)), "step");
         apply(dt);
+        after_step(dt);
         settle(dt);
     }
 

@@ -44,20 +44,28 @@ struct material {
     double dissipation = 0.0;
 };
 
-class scene {
+/// Worlds of rigid bodies.
+struct rigid_bodies {
+    using solver = btSequentialImpulseConstraintSolver;
+    using world = btDiscreteDynamicsWorld;
+    using coupler = isocoat::bullet::coupler;
+};
+
+template <class kind>
+class scene_of {
 public:
-    explicit scene(double gravity = -10.0, isocoat_scheme scheme = ISOCOAT_SCHEME_AUTO)
+    explicit scene_of(double gravity = -10.0, isocoat_scheme scheme = ISOCOAT_SCHEME_AUTO)
         : dispatcher(&configuration),
-          dynamics(std::make_unique<btDiscreteDynamicsWorld>(&dispatcher, &broadphase, &solver, &configuration)) {
+          dynamics(std::make_unique<typename kind::world>(&dispatcher, &broadphase, &solver, &configuration)) {
         dynamics->setGravity(btVector3(0, btScalar(gravity), 0));
         isocoat_world_desc desc = isocoat_world_desc_default();
         desc.scheme = scheme;
         must(isocoat_world_create(&desc, &coats));
-        coupler = std::make_unique<isocoat::bullet::coupler>(coats, dynamics.get());
+        coupler = std::make_unique<typename kind::coupler>(coats, dynamics.get());
         dynamics->addAction(coupler.get());
     }
 
-    ~scene() {
+    ~scene_of() {
         if (dynamics && coupler) {
             dynamics->removeAction(coupler.get());
         }
@@ -69,8 +77,8 @@ public:
         must(isocoat_world_destroy(coats));
     }
 
-    scene(const scene &) = delete;
-    scene &operator=(const scene &) = delete;
+    scene_of(const scene_of &) = delete;
+    scene_of &operator=(const scene_of &) = delete;
 
     isocoat_link create_link(const isocoat_link_desc &link_desc, const material &made_of) {
         isocoat_body_desc desc = isocoat_body_desc_default();
@@ -150,14 +158,16 @@ public:
     btDefaultCollisionConfiguration configuration;
     btCollisionDispatcher dispatcher;
     btDbvtBroadphase broadphase;
-    btSequentialImpulseConstraintSolver solver;
-    std::unique_ptr<btDiscreteDynamicsWorld> dynamics;
+    typename kind::solver solver;
+    std::unique_ptr<typename kind::world> dynamics;
     std::vector<std::unique_ptr<btCollisionShape>> shapes;
     std::vector<std::unique_ptr<btRigidBody>> bodies;
     isocoat_world *coats = nullptr;
-    std::unique_ptr<isocoat::bullet::coupler> coupler;
+    std::unique_ptr<typename kind::coupler> coupler;
     /// Internal ticks so far.
     int count = 0;
 };
+
+using scene = scene_of<rigid_bodies>;
 
 #endif
