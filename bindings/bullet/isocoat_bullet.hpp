@@ -23,13 +23,17 @@
 //            it sees on the body; what then differs counts as a push and is taken up one tick later, none is lost.
 // Velocity   Between ticks a body's velocity holds the impulse that is going to meet the next tick's gravity: a body
 //            that rests on coats shows g dt upwards (0.16 m/s at 60 Hz). So sleeping thresholds must be above that;
-//            Bullet's own, 0.8 m/s, is.
+//            Bullet's own, 0.8 m/s, is. A body on a plain floor that coats press from above shows their load: raise
+//            its thresholds if that is more than five times its weight at 60 Hz.
 // Sub-steps  Each internal tick has its own isocoat step. Use fixed ticks: a tick length that changes costs accuracy
 //            while bodies touch.
 // Core       A coat does not replace the body's shape. Filter the shapes against those of coat partners
 //            (add_coated_body or ignore_core), let them collide with the plain world, and see enable_ccd.
 // Held       Every tick the coupler sees which bodies are held: by enabled constraints, and by contacts of their shapes.
-//            isocoat solves what these touch implicitly: it rests soundly, and bounces less than free bodies do.
+//            isocoat solves what these touch implicitly: it rests soundly, and bounces less than free bodies do. What
+//            holds a body is estimated. That is stable while the body with its joints is at most ten times as heavy as
+//            without them, where its coat is: do not hang 20 kg on 1 kg. Links of multibodies have no such bound, see
+//            isocoat_bullet_multibody.hpp.
 // Sleep      Bodies that touch through their coats fall asleep together. A sleeping body keeps its coat: it is pressed
 //            and presses back, but stays where it is. It wakes when what the coat asks of it changes: a new push, or
 //            support that goes away. A pile at rest stays asleep. While everything sleeps, the isocoat world is

@@ -42,6 +42,7 @@ struct material {
     double stiffness_scale = 2e4;
     double friction = 0.0;
     double dissipation = 0.0;
+    double static_friction = 0.0;
 };
 
 /// Worlds of rigid bodies.
@@ -85,6 +86,7 @@ public:
         desc.stiffness_scale = made_of.stiffness_scale;
         desc.friction = made_of.friction;
         desc.dissipation = made_of.dissipation;
+        desc.static_friction = made_of.static_friction;
         isocoat_body body;
         isocoat_link link;
         must(isocoat_body_create(coats, &desc, &body));
