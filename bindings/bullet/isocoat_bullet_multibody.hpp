@@ -26,7 +26,11 @@
 #ifndef ISOCOAT_BULLET_MULTIBODY_HPP
 #define ISOCOAT_BULLET_MULTIBODY_HPP
 
+#include <array>
+#include <unordered_map>
 #include <unordered_set>
+#include <utility>
+#include <vector>
 
 #include <BulletDynamics/Featherstone/btMultiBody.h>
 #include <BulletDynamics/Featherstone/btMultiBodyDynamicsWorld.h>
@@ -278,8 +282,8 @@ private:
     /// Ticks for which what comes and goes counts as there still.
     static constexpr int lasting_ticks = 6;
 
-    /// Part of what was missing in a tick that goes into the estimate: stable while the joints make the link at most ten
-    /// times as heavy as its matrix says.
+    /// Part of what was missing in a tick that goes into the estimate: stable while the link is at most ten times as
+    /// heavy as its matrix says.
     static constexpr double learned = 0.1;
 
     /// Part of a change of the joints' velocities, and of the velocities, by which they may be off unheld.

@@ -8,7 +8,8 @@ constexpr double gravity = 10.0;
 
 double energy_of(const btRigidBody &body, const btVector3 &velocity) {
     const btVector3 turn = body.getAngularVelocity();
-    return 0.5 * double(velocity.length2() * body.getMass() + (body.getInvInertiaTensorWorld().inverse() * turn).dot(turn)) +
+    const btVector3 spin = body.getInvInertiaTensorWorld().inverse() * turn;
+    return 0.5 * double(velocity.length2() * body.getMass() + spin.dot(turn)) +
            gravity * double(body.getMass() * body.getCenterOfMassPosition().y());
 }
 
