@@ -202,7 +202,13 @@ fn patch(pair: &Pair, settings: &Settings, at: &Deepest, extent: f64, out: &mut 
     let first = out.nodes.len();
     let (first_border, first_cell) = (out.borders.len(), out.cells.len());
     let mut spent = 0;
-    if matches!(settings.scheme, Scheme::Auto | Scheme::ClosedForm | Scheme::Facets) {
+    // Where skeletons blend, the surface has more than one face, and what lies between them may be missed.
+    let alone = pair.a.skeletons.len() == 1 && pair.b.skeletons.len() == 1;
+    let facets = match settings.scheme {
+        Scheme::Auto | Scheme::ClosedForm => alone,
+        scheme => scheme == Scheme::Facets,
+    };
+    if facets {
         let first_corner = out.outlines.len();
         match facets::integrate(pair, at, settings.tolerance, &mut out.pieces, &mut out.nodes, &mut out.outlines) {
             Ok(done) => {
