@@ -192,3 +192,18 @@ fn elastic_impacts_of_blends_keep_their_energy() {
     println!("elastic impacts of blends: energy off by {:.2} % at most", 100.0 * worst);
     assert!(failures.is_empty(), "{failures:#?}");
 }
+
+#[test]
+fn seeds_of_a_triangle_at_the_face_of_a_box_push_no_more_than_pressure_times_area() {
+    let corners = [Vec3::new(-0.1, -0.1, 0.0), Vec3::new(0.1, -0.1, 0.0), Vec3::new(0.0, 0.1, 0.0)];
+    let triangle = Coat::new(&[Shape::triangle(corners[0], corners[1], corners[2])], 0.05);
+    let cuboid = Coat::cuboid(Vec3::repeat(0.1), 0.05);
+    // The highest pressure of either coat at its skeleton, on the areas of both and as much again for their roundings.
+    let most = 2e5 * 4.0 * (0.02 + 0.04);
+    for gap in [0.0, 1e-12, 1e-9, 1e-6, 1e-4, 1e-3, 1e-2] {
+        let pose = Pose::at(0.0, 0.0, 0.1 + gap);
+        let force = total(&collide((&triangle, Pose::default()), (&cuboid, pose), Scheme::Seeds, 5e-3));
+        println!("gap {gap:.0e}: {force:?}");
+        assert!(force.norm() <= most, "gap {gap:.0e}: {force:?}");
+    }
+}

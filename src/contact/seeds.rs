@@ -10,7 +10,8 @@
 //!
 //! and a with the opposite, both at `X`; likewise with the roles exchanged. So action equals reaction at any number of
 //! seeds, and moving two bodies round a closed loop does no work. A ray that only grazes the surface would get a
-//! boundless force: below a smallest cosine it counts as if it had that, and the loop closes to what such rays carry.
+//! boundless force, also where the gradients of the two fields cancel: below a smallest part of what they come to
+//! without signs it counts as if it had that, and the loop closes to what such rays carry.
 
 use super::Scheme;
 use super::deepest::Deepest;
@@ -22,7 +23,8 @@ use crate::coat::territory;
 use crate::field::Shape;
 use crate::math::Vec3;
 
-/// Smallest cosine between a ray and the surface's normal that still counts; the other body's rays carry the rest.
+/// Smallest part of both gradients' lengths that the fields must change by along a ray to count as they are; the other
+/// body's rays carry the rest.
 const GRAZING: f64 = 0.05;
 
 /// Integrates all of a pair's contact with the seeds of both coats.
@@ -115,9 +117,11 @@ fn cast(pair: &Pair, from_a: bool, skeleton: usize, ray: &Ray, nodes: &mut Vec<N
         return evaluations;
     }
     let steepness = sample.difference_gradient.norm();
-    let along = (-sign * sample.difference_gradient.dot(&ray.direction)).max(GRAZING * steepness);
-    let measure = ray.weight * r.powi(i32::from(ray.power));
     let others_part = pair.others_part(&sample, from_a);
+    // Where the two parts cancel, their difference is no measure: neither force nor area may grow past `1 / GRAZING`.
+    let least = GRAZING * (others_part.norm() + pair.others_part(&sample, !from_a).norm());
+    let along = (-sign * sample.difference_gradient.dot(&ray.direction)).max(least);
+    let measure = ray.weight * r.powi(i32::from(ray.power));
     // On b: the partner of an a ray is b itself.
     let force = others_part * (sign * pressure * measure / along);
     // Both bodies' rays cover the surface: each counts for the share of its partner's gradient.
