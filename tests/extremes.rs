@@ -1,8 +1,8 @@
 //! Stability at the extremes: one parameter of a scene at a time, far beyond what is usual, under each response.
 //!
 //! The short form is part of the tests; `make extremes` runs all rows and writes docs/extremes.md. A row passes when
-//! all stays finite, no energy comes from nowhere, and nothing leaves its place; where a load or a speed is more than
-//! the coats can carry, that must have been reported.
+//! all stays finite, nothing leaves its place, and no energy comes from nowhere: where an overload or a warning was
+//! reported, up to a tenth may.
 
 mod common;
 
@@ -365,10 +365,11 @@ fn the_ends_of_the_sweeps_hold() {
 #[ignore = "takes long; make extremes"]
 fn all_rows() {
     let (text, failures) = table(false);
-    let head = "# Extremes\n\nWritten by `make extremes`: one parameter at a time, 60 Hz and at most 600 steps, and \
-                at most five seconds of computing, unless the row says otherwise. `gain` is the largest kinetic and height energy over the first; a row passes when all is \
-                finite, the gain is at most 0.1 % (implicit) or 3 % (others), and nothing leaves its place, or an overload \
-                or a warning said so.\n";
+    let head = "# Extremes\n\nWritten by `make extremes`: one parameter at a time, 60 Hz, at most 600 steps and five seconds \
+                of computing a row, unless the row says otherwise. `gain` is how far kinetic energy and that of height \
+                ever rose above the first, as a part of it. A row passes when all is finite, nothing leaves its place, and \
+                the gain is at most 0.1 % (implicit) or 3 % (others); at most 10 % where an overload or a warning was \
+                reported.\n";
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/extremes.md");
     std::fs::write(path, format!("{head}\n{} rows fail.\n{text}", failures.len())).unwrap();
     println!("{} rows fail", failures.len());

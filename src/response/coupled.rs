@@ -162,8 +162,6 @@ pub struct Coupled {
     residual: Vec<f64>,
     base: Vec<f64>,
     step: Vec<f64>,
-    /// Newton steps taken.
-    pub newton_steps: u64,
 }
 
 /// Steps of Newton's method in one solve.
@@ -250,7 +248,6 @@ impl Coupled {
             if norm <= SOLVED * scale {
                 return true;
             }
-            self.newton_steps += 1;
             self.step.clone_from(&self.residual);
             // As exactly as it takes to be done after this step, or as a step of Newton's method can use.
             let enough = (0.3 * (SOLVED * scale / norm).sqrt()).clamp(GRADIENTS.0, GRADIENTS.1);
