@@ -1,13 +1,17 @@
 //! Border-adaptive subdivision: for patches that are not star-shaped, have several deepest points, or corners.
 //!
-//! Square cells of the plane spread from the deepest point as far as there is contact. Inside the contact a cell takes
-//! a 2×2 Gauss rule; across the border it is clipped along the line where the pressure, linear over the cell, is zero.
-//! Both are of fourth order, since the pressure vanishes at the border. Cells are split where a split changed most,
-//! until what is left meets the tolerance.
+//! Square cells of the plane spread from the deepest point as far as there is contact; each looks at the surface at its
+//! corners, its edges' middles and its centre, which neighbours and halves share. The distance to a convex core is
+//! convex, so a cell that is in contact at all nine is in contact wherever else, and takes Simpson's rule, of fourth
+//! order. Where a cell is cut by the border, the pressure between its nine places is the mean of two readings, the
+//! values joined up and the tangents blended, which err by the same amount to opposite sides when the pressure is
+//! quadratic. How far they are apart is the estimate there: beside a flat face, which ends within a small part of a
+//! cell, they differ by all that may be missed. Cells are split where most is in doubt, until what is left meets the
+//! tolerance.
 
 use std::collections::HashMap;
 
-use super::column::{Column, Frame, Solver};
+use super::column::{Frame, Solver};
 use super::deepest::Deepest;
 use super::pair::Pair;
 use super::patch::Node;
@@ -19,21 +23,44 @@ const GRID: f64 = 0.5;
 const MOST_CELLS: usize = 30_000;
 /// Most halvings of a cell.
 const DEEPEST_LEVEL: u32 = 14;
+/// Half a side of a cell of the first grid, on the lattice that all places lie on.
+const FIRST_HALF: i32 = 1 << DEEPEST_LEVEL;
+/// Parts that a quarter of a cell is read in across each side.
+const PARTS: i32 = 4;
+
+/// A place of the plane where the surface was looked for.
+#[derive(Clone, Copy, Debug)]
+struct Vertex {
+    x: f64,
+    y: f64,
+    /// Height of the surface, and its slopes.
+    height: f64,
+    slopes: [f64; 2],
+    /// `σ` there, and its slopes along the surface.
+    sum: f64,
+    gradient: [f64; 2],
+    /// Vector area, and stiffness, of a unit of the plane.
+    area: Vec3,
+    stiffness: f64,
+    /// What Simpson's rule gives it in all cells together.
+    weight: f64,
+}
 
 /// A square of the plane.
 #[derive(Clone, Copy, Debug)]
 struct Cell {
-    x: f64,
-    y: f64,
-    /// Half of its side.
-    half: f64,
-    level: u32,
-    /// Height of the surface over the centre, and its slopes.
-    height: f64,
-    slopes: [f64; 2],
+    /// Its centre and half its side on the lattice.
+    center: (i32, i32),
+    half: i32,
+    /// The nine places, row by row; `None` where no surface was found.
+    vertices: [Option<u32>; 9],
+    /// In contact all over.
+    inside: bool,
     force: Vec3,
+    /// How far the force may be off, along the frame's normal and, in a cell that is inside, sideways.
     error: f64,
-    /// Its nodes in the pool.
+    aside: f64,
+    /// The nodes of a cell on the border, in the pool.
     nodes: (usize, usize),
     split: bool,
 }
@@ -41,6 +68,8 @@ struct Cell {
 /// What is left of an integration, and its memory.
 #[derive(Debug, Default)]
 pub struct Workspace {
+    vertices: Vec<Vertex>,
+    places: HashMap<(i32, i32), Option<u32>>,
     cells: Vec<Cell>,
     pool: Vec<Node>,
     visited: HashMap<(i32, i32), bool>,
@@ -95,13 +124,46 @@ pub fn integrate(
     if work.leans {
         return Err(LeansOver { evaluations });
     }
-    for cell in workspace.cells.iter().filter(|cell| !cell.split) {
-        nodes.extend_from_slice(&workspace.pool[cell.nodes.0..cell.nodes.1]);
-    }
+    workspace.collect(pair, &frame, nodes);
     let first = cells.len();
     cells.extend(workspace.visited.iter().filter(|(_, active)| **active).map(|(key, _)| *key));
     cells[first..].sort_unstable();
     Ok(Integrated { error, evaluations, frame })
+}
+
+/// Part of the difference between Simpson's rule and the trapezes' that counts as the former's error.
+const SIDEWAYS: f64 = 0.25;
+
+/// Simpson's weights along a side, and those of two trapezes, of a side of length one.
+const SIMPSON: [f64; 3] = [1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0];
+const TRAPEZES: [f64; 3] = [0.25, 0.5, 0.25];
+
+impl Workspace {
+    /// Gives the nodes of all cells: the places inside, each once, and what lies at the border.
+    fn collect(&mut self, pair: &Pair, frame: &Frame, nodes: &mut Vec<Node>) {
+        for cell in self.cells.iter().filter(|cell| cell.inside && !cell.split) {
+            let area = (2.0 * length(cell.half)).powi(2);
+            for (index, vertex) in cell.vertices.iter().enumerate() {
+                if let Some(vertex) = vertex {
+                    self.vertices[*vertex as usize].weight += SIMPSON[index % 3] * SIMPSON[index / 3] * area;
+                }
+            }
+        }
+        nodes.extend(self.vertices.iter().filter(|vertex| vertex.weight > 0.0).map(|vertex| Node {
+            position: frame.point(vertex.x, vertex.y, vertex.height),
+            force: vertex.area * (pair.scale * vertex.sum * vertex.weight),
+            area: vertex.area.norm() * vertex.weight,
+            stiffness: vertex.stiffness * vertex.weight,
+        }));
+        for cell in self.cells.iter().filter(|cell| !cell.split) {
+            nodes.extend_from_slice(&self.pool[cell.nodes.0..cell.nodes.1]);
+        }
+    }
+}
+
+/// A length on the lattice in units of the frame.
+fn length(steps: i32) -> f64 {
+    f64::from(steps) * (0.5 * GRID / f64::from(FIRST_HALF))
 }
 
 struct Work<'a, 'b> {
@@ -113,6 +175,8 @@ struct Work<'a, 'b> {
 impl Work<'_, '_> {
     /// Covers the contact with cells of the first grid, from the deepest point outwards.
     fn spread(&mut self, at: &Deepest) {
+        self.workspace.vertices.clear();
+        self.workspace.places.clear();
         self.workspace.cells.clear();
         self.workspace.pool.clear();
         self.workspace.visited.clear();
@@ -122,21 +186,23 @@ impl Work<'_, '_> {
         self.workspace.queue.push((i, j, height));
         self.workspace.visited.insert((i, j), false);
         let mut next = 0;
-        while next < self.workspace.queue.len() && self.workspace.cells.len() < MOST_CELLS / 8 {
+        while !self.leans && next < self.workspace.queue.len() && self.workspace.cells.len() < MOST_CELLS / 8 {
             let (i, j, guess) = self.workspace.queue[next];
             next += 1;
-            let (x, y) = (f64::from(i) * GRID, f64::from(j) * GRID);
-            let Some((cell, active)) = self.measure(x, y, 0.5 * GRID, 0, guess) else { continue };
-            if !active {
+            let Some(cell) = self.measure((2 * i * FIRST_HALF, 2 * j * FIRST_HALF), FIRST_HALF, guess) else {
                 continue;
-            }
+            };
             self.workspace.visited.insert((i, j), true);
             for (di, dj) in [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1)] {
                 let key = (i + di, j + dj);
                 if let std::collections::hash_map::Entry::Vacant(entry) = self.workspace.visited.entry(key) {
                     entry.insert(false);
-                    let along = [f64::from(di) * GRID, f64::from(dj) * GRID];
-                    let guess = cell.height + cell.slopes[0] * along[0] + cell.slopes[1] * along[1];
+                    // From the place of this cell that is next to the other's centre.
+                    let near = cell.vertices[((dj + 1) * 3 + di + 1) as usize];
+                    let guess = near.map_or(guess, |near| {
+                        let near = &self.workspace.vertices[near as usize];
+                        near.height + 0.5 * GRID * (near.slopes[0] * f64::from(di) + near.slopes[1] * f64::from(dj))
+                    });
                     self.workspace.queue.push((key.0, key.1, guess));
                 }
             }
@@ -150,22 +216,22 @@ impl Work<'_, '_> {
             let (mut force, mut error, mut worst, mut live) = (Vec3::zeros(), 0.0, 0.0f64, 0usize);
             for cell in self.workspace.cells.iter().filter(|cell| !cell.split) {
                 force += cell.force;
-                error += cell.error;
-                worst = worst.max(cell.error);
+                error += cell.error + cell.aside;
                 live += 1;
+                if cell.half > 1 {
+                    worst = worst.max(cell.error + cell.aside);
+                }
             }
             let size = force.norm();
-            let relative = if size > 0.0 { error / size } else { 0.0 };
-            if relative <= tolerance || worst == 0.0 || self.workspace.cells.len() + 4 > MOST_CELLS {
-                return relative + 1e-14;
+            let relative = if size > 0.0 { error / size } else { 1.0 };
+            if self.leans || relative <= tolerance || worst == 0.0 || self.workspace.cells.len() + 4 > MOST_CELLS {
+                return relative.min(1.0) + 1e-14;
             }
-            let limit = (0.2 * worst).max(0.25 * tolerance * size / live as f64);
+            let limit = (0.2 * worst).max(0.25 * tolerance * size / live as f64).min(worst);
             for index in 0..self.workspace.cells.len() {
-                let cell = self.workspace.cells[index];
-                if !cell.split && cell.error >= limit && cell.level < DEEPEST_LEVEL {
+                let cell = &self.workspace.cells[index];
+                if !cell.split && cell.half > 1 && cell.error + cell.aside >= limit {
                     self.split(index);
-                } else if !cell.split && cell.level >= DEEPEST_LEVEL {
-                    self.workspace.cells[index].error = 0.0;
                 }
             }
         }
@@ -174,157 +240,235 @@ impl Work<'_, '_> {
     fn split(&mut self, index: usize) {
         let parent = self.workspace.cells[index];
         self.workspace.cells[index].split = true;
+        let half = parent.half / 2;
         let first = self.workspace.cells.len();
-        let mut force = Vec3::zeros();
-        let half = 0.5 * parent.half;
-        for (sx, sy) in [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)] {
-            let guess = parent.height + (parent.slopes[0] * sx + parent.slopes[1] * sy) * half;
-            let (x, y) = (parent.x + sx * half, parent.y + sy * half);
-            if let Some((cell, true)) = self.measure(x, y, half, parent.level + 1, guess) {
-                force += cell.force;
+        for (sx, sy) in [(-1, -1), (1, -1), (-1, 1), (1, 1)] {
+            let center = (parent.center.0 + sx * half, parent.center.1 + sy * half);
+            // From the middle of the parent, or else from a corner of it.
+            let corner = ((sy + 1) * 3 + sx + 1) as usize;
+            let (from, away) = if parent.vertices[4].is_some() { (4, 1) } else { (corner, -1) };
+            let guess = parent.vertices[from].map_or(0.0, |from| {
+                let from = &self.workspace.vertices[from as usize];
+                let (dx, dy) = (length(away * sx * half), length(away * sy * half));
+                from.height + from.slopes[0] * dx + from.slopes[1] * dy
+            });
+            if let Some(cell) = self.measure(center, half, guess) {
                 self.workspace.cells.push(cell);
             }
         }
-        let count = self.workspace.cells.len() - first;
-        if count == 0 {
-            return;
-        }
-        // A fourth-order rule is fifteen times better after a split where the fields are smooth, and hardly better
-        // where a kink of theirs crosses the cell. Count on the kink.
-        let error = 0.75 * (parent.force - force).norm() / count as f64;
-        for cell in &mut self.workspace.cells[first..] {
-            cell.error = error;
+        let children = &self.workspace.cells[first..];
+        if parent.inside && children.iter().all(|cell| cell.inside) {
+            // Where the fields are smooth a split makes Simpson's rule fifteen times better, across a kink hardly so.
+            let change = parent.force - children.iter().map(|cell| cell.force).sum::<Vec3>();
+            let aside = self.sideways(&change) / 4.0;
+            for cell in &mut self.workspace.cells[first..] {
+                cell.aside = cell.aside.min(aside);
+            }
         }
     }
 
-    /// Integrates one cell; says whether it holds contact.
-    fn measure(&mut self, x: f64, y: f64, half: f64, level: u32, guess: f64) -> Option<(Cell, bool)> {
-        let first = self.workspace.pool.len();
-        let Some(center) = self.solver.column(x, y, guess) else {
-            self.leans |= self.contact_leans(x, y, guess);
-            return None;
-        };
-        let (slopes, gradient) = self.slopes(&center);
-        let height_at = |dx: f64, dy: f64| center.height + slopes[0] * dx + slopes[1] * dy;
-        let gauss = half / 3f64.sqrt();
-        let corners = [(-gauss, -gauss), (gauss, -gauss), (-gauss, gauss), (gauss, gauss)];
-        let mut columns = [center; 4];
-        for (column, (dx, dy)) in columns.iter_mut().zip(corners) {
-            *column = self.solver.column(x + dx, y + dy, height_at(dx, dy))?;
+    /// Integrates one cell; `None` when it holds no contact.
+    fn measure(&mut self, center: (i32, i32), half: i32, guess: f64) -> Option<Cell> {
+        let middle = self.vertex(center, guess, guess);
+        let mut vertices = [middle; 9];
+        for (index, vertex) in vertices.iter_mut().enumerate().filter(|(index, _)| *index != 4) {
+            let (i, j) = ((index % 3) as i32 - 1, (index / 3) as i32 - 1);
+            let (height, slopes) = middle.map_or((guess, [0.0; 2]), |middle| {
+                let middle = &self.workspace.vertices[middle as usize];
+                (middle.height, middle.slopes)
+            });
+            let along = height + slopes[0] * length(i * half) + slopes[1] * length(j * half);
+            *vertex = self.vertex((center.0 + i * half, center.1 + j * half), along, height);
         }
-        let sums = columns.map(|column| column.sum);
-        let lowest = sums.into_iter().fold(center.sum, f64::min);
-        let highest = sums.into_iter().fold(center.sum, f64::max);
-        // The plane through the four samples, and how far they are from it.
-        let mean = 0.25 * (sums[0] + sums[1] + sums[2] + sums[3]);
-        let gx = 0.25 * (sums[1] + sums[3] - sums[0] - sums[2]) / gauss;
-        let gy = 0.25 * (sums[2] + sums[3] - sums[0] - sums[1]) / gauss;
-        let bend = (center.sum - mean).abs() + 0.25 * (sums[0] + sums[3] - sums[1] - sums[2]).abs();
-        let reach = (gx.abs().max(gradient[0].abs()) + gy.abs().max(gradient[1].abs())) * half + 3.0 * bend;
+        let first = self.workspace.pool.len();
         let mut cell = Cell {
-            x,
-            y,
+            center,
             half,
-            level,
-            height: center.height,
-            slopes,
+            vertices,
+            inside: true,
             force: Vec3::zeros(),
             error: 0.0,
+            aside: 0.0,
             nodes: (first, first),
             split: false,
         };
-        if highest <= 0.0 && mean.max(center.sum) + reach <= 0.0 {
-            return Some((cell, false));
+        let scale = self.solver.pair.scale * (2.0 * length(half)).powi(2);
+        // Simpson's rule, and the trapezes' with their ends corrected, which is of fourth order too; of the sideways
+        // part, whose slopes are not known, the trapezes' alone.
+        let (mut simpson, mut corrected, mut rough) = (0.0, 0.0, Vec3::zeros());
+        for (index, vertex) in vertices.iter().enumerate() {
+            let Some(vertex) = vertex.map(|vertex| &self.workspace.vertices[vertex as usize]).filter(|v| v.sum > 0.0)
+            else {
+                cell.inside = false;
+                break;
+            };
+            let (column, row) = (index % 3, index / 3);
+            let weight = SIMPSON[column] * SIMPSON[row];
+            let force = vertex.area * (scale * vertex.sum);
+            cell.force += force * weight;
+            rough += force * (TRAPEZES[column] * TRAPEZES[row]);
+            simpson += vertex.sum * weight;
+            let ends = [TRAPEZES[row] * (1.0 - column as f64), TRAPEZES[column] * (1.0 - row as f64)];
+            corrected += vertex.sum * TRAPEZES[column] * TRAPEZES[row]
+                + (ends[0] * vertex.gradient[0] + ends[1] * vertex.gradient[1]) * length(half) / 24.0;
         }
-        if lowest > 0.0 && mean.min(center.sum) - reach > 0.0 {
-            for (column, (dx, dy)) in columns.iter().zip(corners) {
-                let node = self.solver.node(x + dx, y + dy, column, half * half);
-                self.workspace.pool.extend(node);
+        cell.error = (simpson - corrected).abs() * scale * self.solver.frame.unit_area();
+        cell.aside = SIDEWAYS * self.sideways(&(cell.force - rough));
+        if !cell.inside {
+            (cell.force, cell.error, cell.aside) = (Vec3::zeros(), 0.0, 0.0);
+            let mut touched = false;
+            for corner in [0, 1, 3, 4] {
+                let quarter = [corner, corner + 1, corner + 3, corner + 4].map(|index| vertices[index]);
+                touched |= self.quarter(quarter, &mut cell);
             }
-        } else {
-            self.clip(&cell, mean, gx, gy);
+            cell.nodes.1 = self.workspace.pool.len();
+            if !touched {
+                return None;
+            }
         }
-        cell.nodes = (first, self.workspace.pool.len());
-        cell.force = self.workspace.pool[first..].iter().map(|node| node.force).sum();
-        // Unknown until a split tells: count it whole.
-        cell.error = cell.force.norm().max(1e-300);
-        Some((cell, true))
+        Some(cell)
     }
 
-    /// Integrates over the part of a cell where `mean + gx dx + gy dy` is positive.
-    fn clip(&mut self, cell: &Cell, mean: f64, gx: f64, gy: f64) {
-        let h = cell.half;
-        let square = [(-h, -h), (h, -h), (h, h), (-h, h)];
-        let level = |(dx, dy): (f64, f64)| mean + gx * dx + gy * dy;
-        let mut polygon = [(0.0, 0.0); 5];
-        let mut count = 0;
-        for index in 0..4 {
-            let (p, q) = (square[index], square[(index + 1) % 4]);
-            let (lp, lq) = (level(p), level(q));
-            if lp > 0.0 {
-                polygon[count] = p;
-                count += 1;
-            }
-            if (lp > 0.0) != (lq > 0.0) {
-                let t = lp / (lp - lq);
-                polygon[count] = (p.0 + t * (q.0 - p.0), p.1 + t * (q.1 - p.1));
-                count += 1;
-            }
+    /// Adds what a quarter of a cell on the border carries. False when it holds no contact.
+    fn quarter(&mut self, corners: [Option<u32>; 4], cell: &mut Cell) -> bool {
+        let side = length(cell.half);
+        let scale = self.solver.pair.scale;
+        let mut found = [None; 4];
+        for (vertex, index) in found.iter_mut().zip(corners) {
+            *vertex = index.map(|index| self.workspace.vertices[index as usize]);
         }
-        if count < 3 {
-            return;
-        }
-        // Triangles round the centroid, each by its edges' midpoints: of second order, and the same turned half way
-        // round, so that opposite cells of a symmetric contact balance.
-        let polygon = &polygon[..count];
-        let cross = |p: (f64, f64), q: (f64, f64)| p.0 * q.1 - p.1 * q.0;
-        let mut center = (0.0, 0.0);
-        let mut total = 0.0;
-        for index in 0..count {
-            let (p, q) = (polygon[index], polygon[(index + 1) % count]);
-            let area = cross(p, q);
-            total += area;
-            center = (center.0 + area * (p.0 + q.0), center.1 + area * (p.1 + q.1));
-        }
-        if total <= 0.0 {
-            return;
-        }
-        center = (center.0 / (3.0 * total), center.1 / (3.0 * total));
-        let triangle = |index: usize| {
-            let (p, q) = (polygon[index % count], polygon[(index + 1) % count]);
-            0.5 * cross((p.0 - center.0, p.1 - center.1), (q.0 - center.0, q.1 - center.1))
+        let [Some(v00), Some(v10), Some(v01), Some(v11)] = found else {
+            // Part of the surface is out of sight: at most all of it is pressed like what is seen.
+            let highest = found.into_iter().flatten().max_by(|v, w| v.sum.total_cmp(&w.sum));
+            let Some(vertex) = highest.filter(|vertex| vertex.sum > 0.0) else { return false };
+            let weight = 0.5 * side * side;
+            let force = vertex.area * (scale * vertex.sum * weight);
+            self.workspace.pool.push(Node {
+                position: self.solver.frame.point(vertex.x, vertex.y, vertex.height),
+                force,
+                area: vertex.area.norm() * weight,
+                stiffness: vertex.stiffness * weight,
+            });
+            cell.force += force;
+            cell.error += force.norm();
+            return true;
         };
-        for index in 0..count {
-            let (p, q) = (polygon[index], polygon[(index + 1) % count]);
-            let spoke = (0.5 * (center.0 + p.0), 0.5 * (center.1 + p.1));
-            let edge = (0.5 * (p.0 + q.0), 0.5 * (p.1 + q.1));
-            self.add(cell, spoke, (triangle(index + count - 1) + triangle(index)) / 3.0);
-            self.add(cell, edge, triangle(index) / 3.0);
+        let corners = [v00, v10, v01, v11];
+        let bound = if corners.iter().any(|vertex| vertex.sum > 0.0) { None } else { Some(self.most(&corners, side)) };
+        if bound.is_some_and(|bound| bound <= 0.0) {
+            return false;
         }
+        let part = 1.0 / f64::from(PARTS);
+        let (mut force, mut area, mut stiffness, mut doubt) = (Vec3::zeros(), 0.0, 0.0, 0.0);
+        let (mut moment, mut load) = ([0.0; 3], 0.0);
+        for i in 0..PARTS {
+            for j in 0..PARTS {
+                let (x, y) = ((f64::from(i) + 0.5) * part, (f64::from(j) + 0.5) * part);
+                let weights = [(1.0 - x) * (1.0 - y), x * (1.0 - y), (1.0 - x) * y, x * y];
+                let read = Reading::new(&corners, &weights, (x, y), side, part);
+                let mut density = Vec3::zeros();
+                let (mut height, mut hardness) = (0.0, 0.0);
+                for (vertex, weight) in corners.iter().zip(weights) {
+                    density += vertex.area * weight;
+                    height += vertex.height * weight;
+                    hardness += vertex.stiffness * weight;
+                }
+                let unit = (side * part).powi(2);
+                let Reading { covered, pressed, .. } = read;
+                force += density * (scale * pressed * unit);
+                doubt += bound.unwrap_or(read.doubt) * density.norm() * scale * unit;
+                area += density.norm() * covered * unit;
+                stiffness += hardness * covered * unit;
+                load += pressed;
+                for (sum, value) in moment.iter_mut().zip([x, y, height]) {
+                    *sum += pressed * value;
+                }
+            }
+        }
+        cell.error += doubt;
+        if load > 0.0 {
+            cell.force += force;
+            let [x, y, height] = moment.map(|sum| sum / load);
+            let position = self.solver.frame.point(v00.x + x * side, v00.y + y * side, height);
+            self.workspace.pool.push(Node { position, force, area, stiffness });
+        }
+        true
     }
 
-    /// Adds the node of a place in a cell, if there is contact.
-    fn add(&mut self, cell: &Cell, (dx, dy): (f64, f64), weight: f64) {
-        let guess = cell.height + cell.slopes[0] * dx + cell.slopes[1] * dy;
-        if let Some(column) = self.solver.column(cell.x + dx, cell.y + dy, guess) {
-            let node = self.solver.node(cell.x + dx, cell.y + dy, &column, weight);
-            self.workspace.pool.extend(node);
-        }
-    }
-
-    /// Slopes of the height, and of `σ` along the surface, a unit of the coordinates.
-    fn slopes(&self, column: &Column) -> ([f64; 2], [f64; 2]) {
+    /// A bound of `σ` from above over a quarter of a cell: what the fields can at most be within the slanted box that
+    /// the surface lies in.
+    fn most(&self, corners: &[Vertex; 4], side: f64) -> f64 {
         let frame = &self.solver.frame;
-        let sample = &column.sample;
-        let fall = sample.difference_gradient.dot(&frame.normal);
-        let rise = sample.sum_gradient.dot(&frame.normal);
-        let mut slopes = [0.0; 2];
-        let mut gradient = [0.0; 2];
-        for (axis, direction) in [frame.u, frame.v].into_iter().enumerate() {
-            slopes[axis] = -sample.difference_gradient.dot(&direction) / fall * frame.scale[axis];
-            gradient[axis] = sample.sum_gradient.dot(&direction) * frame.scale[axis] + rise * slopes[axis];
+        let [v00, v10, v01, v11] = corners;
+        let mean = |value: &dyn Fn(&Vertex) -> f64| 0.25 * corners.iter().map(value).sum::<f64>();
+        let (height, half) = (mean(&|vertex| vertex.height), 0.5 * side);
+        let rise =
+            [v10.height + v11.height - v00.height - v01.height, v01.height + v11.height - v00.height - v10.height]
+                .map(|rise| 0.25 * rise);
+        let twist = 0.25 * (v00.height + v11.height - v10.height - v01.height).abs();
+        let turn = |axis: usize| {
+            let slopes = corners.map(|vertex| vertex.slopes[axis]);
+            slopes.iter().fold(f64::MIN, |x, y| x.max(*y)) - slopes.iter().fold(f64::MAX, |x, y| x.min(*y))
+        };
+        let bend = twist + 0.25 * side * (turn(0) + turn(1));
+        let center = frame.point(v00.x + half, v00.y + half, height);
+        let legs = [
+            frame.u * (half * frame.scale[0]) + frame.normal * rise[0],
+            frame.v * (half * frame.scale[1]) + frame.normal * rise[1],
+            frame.normal * bend,
+        ];
+        self.solver.pair.most(&center, &legs)
+    }
+
+    /// The surface over a place of the lattice, from a guess of its height, or a second one.
+    fn vertex(&mut self, place: (i32, i32), guess: f64, second: f64) -> Option<u32> {
+        if let Some(known) = self.workspace.places.get(&place) {
+            return *known;
         }
-        (slopes, gradient)
+        let (x, y) = (length(place.0), length(place.1));
+        let mut column = None;
+        for guess in [guess, second, 0.0] {
+            column = self.solver.column(x, y, guess);
+            if column.is_some() {
+                break;
+            }
+        }
+        let found = column.map(|column| {
+            let frame = &self.solver.frame;
+            let sample = &column.sample;
+            let fall = -sample.difference_gradient.dot(&frame.normal);
+            let rise = sample.sum_gradient.dot(&frame.normal);
+            let (mut slopes, mut gradient) = ([0.0; 2], [0.0; 2]);
+            for (axis, direction) in [frame.u, frame.v].into_iter().enumerate() {
+                slopes[axis] = sample.difference_gradient.dot(&direction) / fall * frame.scale[axis];
+                gradient[axis] = sample.sum_gradient.dot(&direction) * frame.scale[axis] + rise * slopes[axis];
+            }
+            // Vector area: n dA = ∇Φ / (∇Φ·normal) times the area in the plane.
+            let area = sample.difference_gradient * (-frame.unit_area() / fall);
+            let size = area.norm();
+            self.workspace.vertices.push(Vertex {
+                x,
+                y,
+                height: column.height,
+                slopes,
+                sum: column.sum,
+                gradient,
+                area,
+                stiffness: size * self.solver.pair.normal_stiffness(sample, &(area / size)),
+                weight: 0.0,
+            });
+            (self.workspace.vertices.len() - 1) as u32
+        });
+        if found.is_none() {
+            self.leans |= self.contact_leans(x, y, guess);
+        }
+        self.workspace.places.insert(place, found);
+        found
+    }
+
+    /// Length of the part of a vector across the frame's normal.
+    fn sideways(&self, v: &Vec3) -> f64 {
+        (v - self.solver.frame.normal * v.dot(&self.solver.frame.normal)).norm()
     }
 
     /// Whether there is still pressure where a column was not found.
@@ -333,5 +477,105 @@ impl Work<'_, '_> {
         let square = sample.difference_gradient.norm_squared();
         square > 0.0
             && sample.sum - sample.difference * sample.sum_gradient.dot(&sample.difference_gradient) / square > 0.0
+    }
+}
+
+/// `σ` in a part of a quarter of a cell, from the quarter's corners.
+struct Reading {
+    /// Share of it that is in contact.
+    covered: f64,
+    /// Mean of what is positive.
+    pressed: f64,
+    /// How far that may be off.
+    doubt: f64,
+}
+
+impl Reading {
+    fn new(corners: &[Vertex; 4], weights: &[f64; 4], (x, y): (f64, f64), side: f64, part: f64) -> Self {
+        let (mut joined, mut blended, mut inside) = (0.0, 0.0, true);
+        // The lowest tangent of a place in contact: what a concave pressure stays below.
+        let (mut below, mut slope_below) = (f64::INFINITY, [0.0; 2]);
+        let (mut slope_joined, mut slope_blended) = ([0.0; 2], [0.0; 2]);
+        for (index, (vertex, weight)) in corners.iter().zip(weights).enumerate() {
+            let (cx, cy) = ((index % 2) as f64, (index / 2) as f64);
+            let tangent = vertex.sum + side * (vertex.gradient[0] * (x - cx) + vertex.gradient[1] * (y - cy));
+            joined += weight * vertex.sum;
+            blended += weight * tangent;
+            // Outside, where fields run out into nothing, tangents bound nothing.
+            inside &= vertex.sum > 0.0;
+            if vertex.sum > 0.0 && tangent < below {
+                (below, slope_below) = (tangent, vertex.gradient);
+            }
+            // Slopes of the weights, a unit of the coordinates.
+            let towards = [
+                (2.0 * cx - 1.0) * if cy > 0.0 { y } else { 1.0 - y } / side,
+                (2.0 * cy - 1.0) * if cx > 0.0 { x } else { 1.0 - x } / side,
+            ];
+            for axis in 0..2 {
+                slope_joined[axis] += towards[axis] * vertex.sum;
+                slope_blended[axis] += towards[axis] * tangent + weight * vertex.gradient[axis];
+            }
+        }
+        let positive = |value: f64, gradient: [f64; 2]| positive_part(value, gradient.map(|slope| slope * side * part));
+        let (mut value, mut gradient) =
+            (0.5 * (joined + blended), [0, 1].map(|axis| 0.5 * (slope_joined[axis] + slope_blended[axis])));
+        let doubt = if inside {
+            0.5 * (blended - joined).abs()
+        } else {
+            if value > below {
+                (value, gradient) = (below, slope_below);
+            }
+            let least = positive(joined, slope_joined).1;
+            if below.is_finite() { (positive(below, slope_below).1 - least).abs() } else { least }
+        };
+        let (covered, pressed) = positive(value, gradient);
+        Self { covered, pressed, doubt }
+    }
+}
+
+/// Over a square on which a value at the centre changes linearly by `(a, b)` from side to side: the part where it is
+/// positive, and the mean of its positive part.
+fn positive_part(value: f64, [a, b]: [f64; 2]) -> (f64, f64) {
+    let (a, b) = (a.abs(), b.abs());
+    let reach = 0.5 * (a + b);
+    if value >= reach {
+        return (1.0, value);
+    }
+    if value <= -reach {
+        return (0.0, 0.0);
+    }
+    // Divided differences of the cube; a slope that is nearly nil must not cancel.
+    let least = 1e-4 * reach;
+    let (a, b) = (a.max(least), b.max(least));
+    let (mut square, mut cube) = (0.0, 0.0);
+    for (sign, at) in [(1.0, a + b), (-1.0, a - b), (-1.0, b - a), (1.0, -a - b)] {
+        let level: f64 = (value + 0.5 * at).max(0.0);
+        square += sign * level * level;
+        cube += sign * level * level * level;
+    }
+    (square / (2.0 * a * b), cube / (6.0 * a * b))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::positive_part;
+
+    #[test]
+    fn the_positive_part_of_a_linear_function_is_that_of_many_samples() {
+        let n = 400;
+        for (value, slopes) in [(0.1, [1.0, 0.4]), (-0.3, [0.2, 0.9]), (0.0, [1.0, 0.0]), (0.2, [-0.5, 0.5])] {
+            let (mut part, mut mean) = (0.0, 0.0);
+            for i in 0..n {
+                for j in 0..n {
+                    let at = |k: usize| (k as f64 + 0.5) / n as f64 - 0.5;
+                    let level: f64 = value + slopes[0] * at(i) + slopes[1] * at(j);
+                    part += f64::from(level > 0.0) / (n * n) as f64;
+                    mean += level.max(0.0) / (n * n) as f64;
+                }
+            }
+            let (covered, pressed) = positive_part(value, slopes);
+            assert!((covered - part).abs() < 3e-3, "{value} {slopes:?}: {covered} of {part}");
+            assert!((pressed - mean).abs() < 1e-4, "{value} {slopes:?}: {pressed} of {mean}");
+        }
     }
 }

@@ -15,7 +15,8 @@ fn round(side: &Side, skeleton: usize) -> (Round, f64) {
     let placed = &side.skeletons[skeleton];
     let (plane, core) = match &placed.shape {
         Shape::Point(_) | Shape::Segment(..) => (false, 0.0),
-        Shape::Triangle(..) => (true, 0.0),
+        // A face is pressed through when its field can rise no more, which under the cap is before its distance is nil.
+        Shape::Triangle(..) => (true, -0.5 * placed.profile.cap),
         Shape::Box { half, .. } => (true, half.min()),
         Shape::Plane { .. } => (true, f64::INFINITY),
     };
@@ -30,6 +31,13 @@ pub fn is_overloaded(pair: &Pair, i: usize, j: usize, approach: &Approach) -> bo
     if overlap < 0.5 * a.thickness.min(b.thickness) {
         // No pair of round coats gives way this early.
         return false;
+    }
+    // A box in a box, as deep as the middle of one: further on, the way out would turn, and be through.
+    if let (Shape::Box { half: a, .. }, Shape::Box { half: b, .. }) =
+        (&pair.a.skeletons[i].shape, &pair.b.skeletons[j].shape)
+        && -approach.distance >= a.min().min(b.min())
+    {
+        return true;
     }
     // All the flesh of one is pressed together.
     let peak = overlap / (a.compliance + b.compliance);

@@ -86,6 +86,25 @@ impl Side {
         self.links.iter().all(|link| *link == first).then_some(first)
     }
 
+    /// A bound from above of `f - c` over the parallelepiped about `center` with these half sides: the distance to a
+    /// convex core stays above its tangents, and fields fall with it.
+    fn most(&self, center: &Vec3, legs: &[Vec3; 3]) -> f64 {
+        const PLACES: [(f64, f64); 5] = [(0.0, 0.0), (1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)];
+        let mut sum = -self.isovalue;
+        for skeleton in &self.skeletons {
+            let mut least = f64::NEG_INFINITY;
+            for (x, y) in PLACES {
+                let closest = skeleton.shape.closest(&(center + legs[0] * x + legs[1] * y));
+                let rise = legs.map(|leg| closest.normal.dot(&leg));
+                let fall = rise.iter().map(|rise| rise.abs()).sum::<f64>();
+                least = least.max(closest.distance - rise[0] * x - rise[1] * y - fall);
+            }
+            let solid = matches!(skeleton.shape, Shape::Box { .. } | Shape::Plane { .. });
+            sum += skeleton.profile.value_slope(if solid { least } else { least.max(0.0) }).0;
+        }
+        sum
+    }
+
     /// Pressure a metre of depth at the surface of a skeleton \[Pa/m\]; infinite for a rigid body.
     pub fn slope(&self, skeleton: usize) -> f64 {
         if self.rigid { f64::INFINITY } else { self.stiffness_scale * self.skeletons[skeleton].profile.stiffness }
@@ -184,6 +203,15 @@ impl Pair {
         }
         let lambda = -sample.sum_gradient.dot(&sample.difference_gradient) / square;
         (sample, ha * (1.0 + lambda * self.wa) + hb * (1.0 - lambda * self.wb))
+    }
+
+    /// A bound of `σ` from above on the contact surface within the parallelepiped about `center` with these half sides.
+    pub fn most(&self, center: &Vec3, legs: &[Vec3; 3]) -> f64 {
+        // On the surface `w_a α = w_b β`, so `σ` is `α / w_b` and `β / w_a`.
+        let share = |side: &Side, weight: f64| {
+            if weight > 0.0 { side.most(center, legs) / weight } else { f64::INFINITY }
+        };
+        share(&self.a, self.wb).min(share(&self.b, self.wa))
     }
 
     /// The part of `-∇Φ` that the partner of a ray's body brings: `w_b ∇β` for a's rays, `w_a ∇α` for b's.

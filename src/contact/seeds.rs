@@ -14,7 +14,7 @@
 //! without signs it counts as if it had that, and the loop closes to what such rays carry.
 
 use super::Scheme;
-use super::deepest::Deepest;
+use super::deepest::{Deepest, approach};
 use super::pair::{Pair, Side};
 use super::patch::Node;
 use super::surface::Surface;
@@ -26,13 +26,42 @@ use crate::math::Vec3;
 /// Smallest part of both gradients' lengths that the fields must change by along a ray to count as they are; the other
 /// body's rays carry the rest.
 const GRAZING: f64 = 0.05;
+/// Share of the load on rays that fall short of that, beyond which the sum says nothing sure.
+const GRAZED: f64 = 0.05;
+
+/// Estimated error of a patch is this, times the number of its seeds to the power -1.2: measured (docs/model.md, "Seeds")
+/// to hold for nearly all poses. The rays of points are spread evenly over all directions; those of lines and faces
+/// come in parts, and a contact cuts each part somewhere.
+const POINTS: f64 = 1.5;
+const PARTS: f64 = 9.0;
+
+/// What the rays came to.
+#[derive(Default)]
+struct Tally {
+    evaluations: u32,
+    /// Load of all nodes, and of those whose ray grazes the surface \[N\].
+    load: f64,
+    grazed: f64,
+    /// Rays that found the surface, and those that should have.
+    met: u32,
+    missed: u32,
+}
+
+impl Tally {
+    /// Part of the force that is in doubt because of rays that graze the surface or miss it.
+    fn doubt(&self) -> f64 {
+        let grazed = if self.load > 0.0 { self.grazed / self.load } else { 0.0 };
+        let missed = f64::from(self.missed) / f64::from((self.met + self.missed).max(1));
+        if grazed > GRAZED { 1.0 } else { (grazed + missed).min(1.0) }
+    }
+}
 
 /// Integrates all of a pair's contact with the seeds of both coats.
 pub fn integrate(pair: &Pair, out: &mut Surface) {
     if out.maxima().is_empty() {
         return;
     }
-    let mut samples = 0u32;
+    let mut tally = Tally::default();
     let first = out.nodes.len();
     for from_a in [true, false] {
         let (own, other) = if from_a { (&pair.a, &pair.b) } else { (&pair.b, &pair.a) };
@@ -43,6 +72,11 @@ pub fn integrate(pair: &Pair, out: &mut Surface) {
         let mut lattice = Vec::new();
         for index in 0..own.skeletons.len() {
             let shape = own.skeletons[index].shape;
+            // Where the partner's coat reaches a skeleton, its rays may start on the partner's side.
+            let reached = (0..other.skeletons.len()).any(|partner| {
+                let [i, j] = if from_a { [index, partner] } else { [partner, index] };
+                approach(pair, i, j).distance < other.reach[partner]
+            });
             let rays: &[Ray] = if let Shape::Plane { point, normal } = &shape {
                 let (low, high) = finite_bounds(other);
                 lattice.clear();
@@ -54,18 +88,27 @@ pub fn integrate(pair: &Pair, out: &mut Surface) {
             let pose = own.poses[index];
             for ray in rays {
                 let ray = if matches!(shape, Shape::Plane { .. }) { *ray } else { ray.transformed(&pose) };
-                samples += cast(pair, from_a, index, &ray, &mut out.nodes);
+                cast(pair, from_a, index, reached, &ray, &mut out.nodes, &mut tally);
             }
         }
     }
-    share_out(pair, first, samples, out);
+    share_out(pair, first, &tally, out);
 }
 
 /// How far behind its surface a half-space is searched for the contact surface, in thicknesses.
 const DEEPEST: f64 = 64.0;
 
-/// Follows one ray to the contact surface and adds its node. Gives the evaluations it took.
-fn cast(pair: &Pair, from_a: bool, skeleton: usize, ray: &Ray, nodes: &mut Vec<Node>) -> u32 {
+/// Follows one ray to the contact surface and adds its node. A ray that starts on its own side counts its flesh from the
+/// surface on; one that starts on the other's, which it may only where the skeleton is `reached`, counts it up to there.
+fn cast(
+    pair: &Pair,
+    from_a: bool,
+    skeleton: usize,
+    reached: bool,
+    ray: &Ray,
+    nodes: &mut Vec<Node>,
+    tally: &mut Tally,
+) {
     let own = if from_a { &pair.a } else { &pair.b };
     let profile = &own.skeletons[skeleton].profile;
     let sign = if from_a { 1.0 } else { -1.0 };
@@ -76,29 +119,33 @@ fn cast(pair: &Pair, from_a: bool, skeleton: usize, ray: &Ray, nodes: &mut Vec<N
         outer = own_surface(own, ray, profile.thickness, own.reach[skeleton]);
     }
     let end = pair.sample(&at(outer));
-    let mut evaluations = 1;
-    if sign * end.difference >= 0.0 {
-        return evaluations;
+    tally.evaluations += 1;
+    let own_at_end = sign * end.difference >= 0.0;
+    if own_at_end && !reached {
+        return;
     }
     let plane = matches!(own.skeletons[skeleton].shape, Shape::Plane { .. });
     // Rays reach back into a solid core as far as their face is the nearest; a half-space goes on.
     let (mut low, mut high) = (if plane { outer - DEEPEST * profile.thickness } else { -ray.core }, outer);
     let start = pair.sample(&at(low));
-    evaluations += 1;
-    if sign * start.difference <= 0.0 {
-        // Pressed beyond the skeleton itself: see `overload`.
-        return evaluations;
+    tally.evaluations += 1;
+    let own_at_start = sign * start.difference > 0.0;
+    if own_at_start == own_at_end {
+        // Without a change of sides there is no surface; all on the other's side is pressed beyond the skeleton itself.
+        tally.missed += u32::from(!own_at_start);
+        return;
     }
+    let turn = if own_at_start { sign } else { -sign };
     let mut r = outer;
     let mut sample = end;
     for _ in 0..60 {
-        let value = sign * sample.difference;
+        let value = turn * sample.difference;
         if value > 0.0 {
             low = r;
         } else {
             high = r;
         }
-        let slope = sign * sample.difference_gradient.dot(&ray.direction);
+        let slope = turn * sample.difference_gradient.dot(&ray.direction);
         let newton = r - value / slope;
         let next = if slope < 0.0 && newton > low && newton < high { newton } else { 0.5 * (low + high) };
         if (next - r).abs() <= 1e-14 * outer.abs() {
@@ -106,7 +153,7 @@ fn cast(pair: &Pair, from_a: bool, skeleton: usize, ray: &Ray, nodes: &mut Vec<N
         }
         r = next;
         sample = pair.sample(&at(r));
-        evaluations += 1;
+        tally.evaluations += 1;
         if sample.difference.abs() <= 1e-13 {
             break;
         }
@@ -114,21 +161,31 @@ fn cast(pair: &Pair, from_a: bool, skeleton: usize, ray: &Ray, nodes: &mut Vec<N
     let position = at(r);
     let pressure = pair.scale * sample.sum;
     if pressure <= 0.0 || !territory::owns(&own.skeletons, own.isovalue, skeleton, &position) {
-        return evaluations;
+        return;
+    }
+    let across = -turn * sample.difference_gradient.dot(&ray.direction);
+    if across <= 0.0 {
+        // It leaves by the wrong side: a kink, or round-off.
+        tally.missed += 1;
+        return;
     }
     let steepness = sample.difference_gradient.norm();
     let others_part = pair.others_part(&sample, from_a);
-    // Where the two parts cancel, their difference is no measure: neither force nor area may grow past `1 / GRAZING`.
+    // Where the parts cancel, their difference is no measure: neither force nor area may grow past `1 / GRAZING`.
     let least = GRAZING * (others_part.norm() + pair.others_part(&sample, !from_a).norm());
-    let along = (-sign * sample.difference_gradient.dot(&ray.direction)).max(least);
+    let along = across.max(least);
     let measure = ray.weight * r.powi(i32::from(ray.power));
     // On b: the partner of an a ray is b itself.
     let force = others_part * (sign * pressure * measure / along);
+    tally.met += 1;
+    tally.load += force.norm();
+    if across < least {
+        tally.grazed += force.norm();
+    }
     // Both bodies' rays cover the surface: each counts for the share of its partner's gradient.
     let area = measure * others_part.norm() / along;
     let normal = sample.difference_gradient / -steepness;
     nodes.push(Node { position, force, area, stiffness: area * pair.normal_stiffness(&sample, &normal) });
-    evaluations
 }
 
 /// Where a ray leaves its blended coat, between the thickness and the reach of its skeleton.
@@ -172,22 +229,31 @@ fn spacing(side: &Side) -> f64 {
 }
 
 /// Gives each node to its nearest deepest point: one patch a deepest point that received any.
-fn share_out(pair: &Pair, first: usize, samples: u32, out: &mut Surface) {
+fn share_out(pair: &Pair, first: usize, tally: &Tally, out: &mut Surface) {
     let maxima: Vec<Deepest> = out.maxima().to_vec();
+    // Coats never pull: what does, and is in doubt, is worth nothing. The overlap is left to the push-out then.
+    let pull = -out.nodes[first..].iter().map(|node| node.force.dot(&maxima[0].normal)).sum::<f64>();
+    if pull >= 0.0 && tally.doubt() >= 1.0 {
+        out.nodes.truncate(first);
+        out.evaluations += tally.evaluations;
+        return;
+    }
     let nearest = |p: &Vec3| {
         let distance = |m: &Deepest| (m.position - p).norm_squared();
         (0..maxima.len()).min_by(|i, j| distance(&maxima[*i]).total_cmp(&distance(&maxima[*j]))).unwrap_or(0)
     };
     let mut owners: Vec<(usize, Node)> = out.nodes.drain(first..).map(|node| (nearest(&node.position), node)).collect();
     owners.sort_by_key(|(owner, _)| *owner);
-    let mut rest = samples;
+    let points =
+        [&pair.a, &pair.b].iter().all(|side| side.skeletons.iter().all(|one| matches!(one.shape, Shape::Point(_))));
+    let law = if points { POINTS } else { PARTS };
+    let mut rest = tally.evaluations;
     for (index, at) in maxima.iter().enumerate() {
         let begin = out.nodes.len();
         out.nodes.extend(owners.iter().filter(|(owner, _)| *owner == index).map(|(_, node)| *node));
         let count = out.nodes.len() - begin;
         if count > 0 {
-            // Measured law of seeds in contact (docs/model.md), doubled to hold for nearly all poses.
-            let error = (0.9 * (count as f64).powf(-1.2)).min(1.0);
+            let error = (law * (count as f64).powf(-1.2) + tally.doubt()).min(1.0);
             out.push(at, begin, pair.scale, error, rest, Scheme::Seeds);
             rest = 0;
         }

@@ -254,7 +254,9 @@ pub fn closest_points(a: &Shape, b: &Shape) -> (Vec3, Vec3) {
     let mut on_a = a.closest_point(&b.middle());
     let mut on_b = b.closest_point(&on_a);
     let mut gap = f64::INFINITY;
+    let mut stride = f64::INFINITY;
     for _ in 0..64 {
+        let before = on_b;
         on_a = a.closest_point(&on_b);
         on_b = b.closest_point(&on_a);
         let now = (on_b - on_a).norm_squared();
@@ -262,6 +264,18 @@ pub fn closest_points(a: &Shape, b: &Shape) -> (Vec3, Vec3) {
             break;
         }
         gap = now;
+        // Between nearly parallel parts the steps shrink slowly, by one ratio: go to where they add up to.
+        let step = on_b - before;
+        let ratio = step.norm() / stride;
+        stride = step.norm();
+        if ratio > 0.3 && ratio < 1.0 {
+            let ahead_a = a.closest_point(&(on_b + step * (ratio / (1.0 - ratio))));
+            let ahead_b = b.closest_point(&ahead_a);
+            let ahead = (ahead_b - ahead_a).norm_squared();
+            if ahead < gap {
+                (on_a, on_b, gap, stride) = (ahead_a, ahead_b, ahead, f64::INFINITY);
+            }
+        }
     }
     (on_a, on_b)
 }
@@ -334,7 +348,7 @@ impl Placed {
 }
 
 #[cfg(test)]
-pub(crate) mod tests {
+pub mod tests {
     use super::*;
     use proptest::prelude::*;
 
