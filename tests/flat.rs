@@ -1,4 +1,5 @@
-//! A box flat on a hard plane against its exact force, over sizes, roundings, depths, turns and tolerances.
+//! Boxes flat and leaning on planes, over sizes, roundings, depths, turns and tolerances: against the exact force where
+//! there is one, and against the facets, which `facets.rs` holds against fine grids.
 
 mod common;
 
@@ -68,6 +69,44 @@ fn a_face_pressed_flat_carries_no_less_than_its_area_times_its_pressure() {
             let (face, all) = (1e7 * depth * 4.0 * half * half, exact(half, thickness, depth));
             assert!(force >= face * (1.0 - tolerance), "depth {depth} tolerance {tolerance:.0e}: {force} of {face}");
             assert!((force / all - 1.0).abs() < tolerance.max(1e-5), "depth {depth}: {force} of {all}");
+        }
+    }
+}
+
+#[test]
+fn leaning_boxes_meet_the_tolerance_by_every_scheme() {
+    for scheme in [Scheme::Polar, Scheme::Adaptive] {
+        for tolerance in [5e-2, 5e-3] {
+            let mut random = Random(3);
+            let (mut worst, mut bounded, mut evaluations, mut count) = (0.0f64, 0.0, 0.0, 0.0);
+            for (half, thickness) in [(0.1, 0.02), (0.1, 0.05), (0.25, 0.02), (0.25, 0.05)] {
+                for part in [0.01, 0.05, 0.2, 0.4] {
+                    for lean in [0.0, 0.0, 0.01, 0.01, 0.05] {
+                        let turn = Vec3::from_fn(|i, _| random.range(-1.0, 1.0) * if i < 2 { lean } else { 3.0 });
+                        let rotation = rotation_from_vector(&turn);
+                        let position = Vec3::z() * (thickness * (2.0 - part) + half);
+                        let cube = Coat::cuboid(Vec3::repeat(half), thickness);
+                        for floor in [Coat::floor(thickness).hard(), Coat::floor(thickness)] {
+                            let collide = |scheme, tolerance| {
+                                let (floor, cube) = ((&floor, Pose::default()), (&cube, Pose { position, rotation }));
+                                collide(floor, cube, scheme, tolerance)
+                            };
+                            let exact = total(&collide(Scheme::Facets, 1e-5));
+                            let contacts = collide(scheme, tolerance);
+                            let error = (total(&contacts) - exact).norm() / exact.norm();
+                            let estimate = contacts.iter().map(|contact| contact.error_estimate).fold(0.0, f64::max);
+                            worst = worst.max(error);
+                            bounded += f64::from(u8::from(error <= estimate + 1e-5));
+                            evaluations += contacts.iter().map(|contact| f64::from(contact.evaluations)).sum::<f64>();
+                            count += 1.0;
+                        }
+                    }
+                }
+            }
+            let (share, mean) = (100.0 * bounded / count, evaluations / count);
+            println!("{scheme:?} {tolerance:.0e}: worst {worst:.1e}, {share:.1} % bounded, {mean:.0} evaluations");
+            assert!(worst <= tolerance, "{scheme:?} {tolerance:.0e}: off by {worst:.1e}");
+            assert!(share >= 95.0, "{scheme:?} {tolerance:.0e}: {share:.1} % bounded");
         }
     }
 }

@@ -21,6 +21,8 @@ use crate::math::Vec3;
 const GRID: f64 = 0.5;
 /// Most cells of one patch, split ones included.
 const MOST_CELLS: usize = 30_000;
+/// Most cells of the first grid: more are finer than it takes to begin with.
+const MOST_FIRST_CELLS: usize = 256;
 /// Most halvings of a cell.
 const DEEPEST_LEVEL: u32 = 14;
 /// Half a side of a cell of the first grid, on the lattice that all places lie on.
@@ -118,7 +120,10 @@ pub fn integrate(
         solver.frame = Frame::new(at, scale);
     }
     let mut work = Work { solver, workspace, leans: false };
-    work.spread(at);
+    // A tilted face is deepest at its rounded edge, which says nothing of its size.
+    while !work.spread(at) {
+        work.solver.frame.scale = work.solver.frame.scale.map(|scale| 4.0 * scale);
+    }
     let error = work.refine(tolerance);
     let (frame, evaluations) = (work.solver.frame, work.solver.evaluations);
     if work.leans {
@@ -173,8 +178,8 @@ struct Work<'a, 'b> {
 }
 
 impl Work<'_, '_> {
-    /// Covers the contact with cells of the first grid, from the deepest point outwards.
-    fn spread(&mut self, at: &Deepest) {
+    /// Covers the contact with cells of the first grid, from the deepest point outwards. False when they are too many.
+    fn spread(&mut self, at: &Deepest) -> bool {
         self.workspace.vertices.clear();
         self.workspace.places.clear();
         self.workspace.cells.clear();
@@ -186,7 +191,10 @@ impl Work<'_, '_> {
         self.workspace.queue.push((i, j, height));
         self.workspace.visited.insert((i, j), false);
         let mut next = 0;
-        while !self.leans && next < self.workspace.queue.len() && self.workspace.cells.len() < MOST_CELLS / 8 {
+        while !self.leans && next < self.workspace.queue.len() {
+            if self.workspace.cells.len() >= MOST_FIRST_CELLS {
+                return false;
+            }
             let (i, j, guess) = self.workspace.queue[next];
             next += 1;
             let Some(cell) = self.measure((2 * i * FIRST_HALF, 2 * j * FIRST_HALF), FIRST_HALF, guess) else {
@@ -208,6 +216,7 @@ impl Work<'_, '_> {
             }
             self.workspace.cells.push(cell);
         }
+        true
     }
 
     /// Splits the cells that matter most until the estimate meets the tolerance; gives the estimate.

@@ -191,17 +191,18 @@ impl Solver<'_> {
         const COUNT: usize = 8;
         let mut polygon = [(0.0, 0.0); COUNT];
         let (mut nearest, mut farthest, mut height) = (f64::INFINITY, 0.0f64, 0.0);
-        for (index, corner) in polygon.iter_mut().enumerate() {
-            let angle = 2.0 * std::f64::consts::PI * index as f64 / COUNT as f64;
+        // First along both axes, both ways: what is round there is no face seen from its rounded edge or corner.
+        for (seen, azimuth) in [0, 4, 2, 6, 1, 5, 3, 7].into_iter().enumerate() {
+            let angle = 2.0 * std::f64::consts::PI * azimuth as f64 / COUNT as f64;
             let direction = (libm::cos(angle), libm::sin(angle));
             let (s, z) = self.border(direction, peak, height)?;
             // Opposite borders of a round patch are as high; else start level again.
             height = if (0.7..1.4).contains(&s) { z } else { 0.0 };
-            *corner = (direction.0 * s * self.frame.scale[0], direction.1 * s * self.frame.scale[1]);
+            polygon[azimuth] = (direction.0 * s * self.frame.scale[0], direction.1 * s * self.frame.scale[1]);
             nearest = nearest.min(s);
             farthest = farthest.max(s);
-            if index == 3 && (0.8..1.25).contains(&nearest) && (0.8..1.25).contains(&farthest) {
-                // Half way round as predicted: the rest will be too, or the estimate will tell.
+            if seen == 3 && (0.8..1.25).contains(&nearest) && (0.8..1.25).contains(&farthest) {
+                // As predicted so far: the rest will be too, or the estimate will tell.
                 return Some(Look::Round);
             }
         }
@@ -243,6 +244,8 @@ impl Solver<'_> {
         let along = frame.u * (dx * frame.scale[0]) + frame.v * (dy * frame.scale[1]);
         let (mut inside, mut height_inside, mut outside) = (0.0, height, f64::INFINITY);
         let (mut s, mut z, mut climbs) = (1.0, guess, 0);
+        // Whether the height was that of the contact before the last climb.
+        let mut from_inside = false;
         for _ in 0..80 {
             let sample = self.pair.sample(&(foot + along * s + frame.normal * z));
             self.evaluations += 1;
@@ -254,13 +257,16 @@ impl Solver<'_> {
                 climbs += 1;
                 if on_slope && climbs <= 4 {
                     z -= sample.difference / phi_z;
-                } else {
+                } else if from_inside {
                     outside = outside.min(s);
                     (s, z, climbs) = (0.5 * (inside + outside), height_inside, 0);
+                } else {
+                    // Perhaps only because of where the search came from.
+                    (z, climbs, from_inside) = (height_inside, 0, true);
                 }
                 continue;
             }
-            climbs = 0;
+            (climbs, from_inside) = (0, false);
             let (sum_s, sum_z) = (sample.sum_gradient.dot(&along), sample.sum_gradient.dot(&frame.normal));
             // σ on the surface here, and its change a unit of s.
             let sum = sample.sum - sample.difference * sum_z / phi_z;

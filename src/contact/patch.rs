@@ -4,7 +4,7 @@ use super::Scheme;
 use crate::math::Vec3;
 
 /// A weighted point of a contact surface, in the pair's frame.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Node {
     /// Where.
     pub position: Vec3,
@@ -14,6 +14,14 @@ pub struct Node {
     pub area: f64,
     /// Normal stiffness, `g_a g_b / (g_a + g_b)` times the area \[N/m\].
     pub stiffness: f64,
+}
+
+impl Node {
+    /// The same place with `weight` times what it carries.
+    pub fn scaled(&self, weight: f64) -> Node {
+        let Node { position, force, area, stiffness } = *self;
+        Node { position, force: force * weight, area: area * weight, stiffness: stiffness * weight }
+    }
 }
 
 /// One connected piece of contact surface.

@@ -4,6 +4,9 @@
 //! pressure's principal curvatures its border is nearly a circle; azimuths are equally spaced, which converges fast for
 //! a smooth border, and along each the radii are the Gauss rule for the weight `s` that knows the pressure to be zero
 //! at the border. The frame comes from the contact alone, so turning a body in place changes nothing.
+//!
+//! Flat faces have corners, and a pressure that drops near the border: no fixed rule sees them. A patch that was not
+//! found to be smooth, or whose rules do not agree, is integrated by halving: along each azimuth, and over the azimuths.
 
 use super::column::{Fit, Frame, Solver};
 use super::deepest::Deepest;
@@ -147,53 +150,226 @@ pub struct NotStarShaped {
     pub evaluations: u32,
 }
 
+/// Most azimuths, and most places along one, of a patch that is integrated by halving.
+const MOST_AZIMUTHS: usize = 400;
+const MOST_RADII: usize = 80;
+
+/// The memory of an integration.
+#[derive(Debug, Default)]
+pub struct Workspace {
+    lines: Vec<Line>,
+    nodes: Vec<Node>,
+    over_azimuths: Halving,
+    along_radius: Halving,
+}
+
+/// An azimuth, integrated along its radius.
+#[derive(Debug)]
+struct Line {
+    nodes: (usize, usize),
+    border: f64,
+    error: f64,
+}
+
 /// Integrates the patch round a deepest point to a relative `tolerance`, appending to `nodes`, and to `border` the
-/// radius of the border at each azimuth, in the frame's units. At the finest level the
-/// result stands, with its estimate, when `last_resort` is set.
+/// radius of the border at equally spaced azimuths, in the frame's units. What does not meet the tolerance stands, with
+/// its estimate, when `last_resort` is set.
 pub fn integrate(
     pair: &Pair,
     at: &Deepest,
     extent: f64,
     tolerance: f64,
     last_resort: bool,
+    workspace: &mut Workspace,
     nodes: &mut Vec<Node>,
     border: &mut Vec<f64>,
 ) -> Result<Integrated, NotStarShaped> {
     let (first, first_border) = (nodes.len(), border.len());
     let mut solver = Solver { pair, frame: Frame::new(at, [1.0, 1.0]), accept: 0.0, border_step: 0.0, evaluations: 0 };
     solver.aim(at.sum, tolerance);
-    let fail = |evaluations, nodes: &mut Vec<Node>, border: &mut Vec<f64>| {
-        nodes.truncate(first);
-        border.truncate(first_border);
-        Err(NotStarShaped { evaluations })
-    };
-    let Some(fit) = solver.fit(at, extent) else { return fail(solver.evaluations, nodes, border) };
-    // The differences are those of coarser rules. A smooth patch is at least four times better; corners are not.
-    let trust = if fit == Fit::Predicted { 0.25 } else { 1.0 };
-    let start = match tolerance {
-        t if t >= 2e-2 => 0,
-        t if t >= 2e-3 => 1,
-        t if t >= 2e-4 => 2,
-        _ => 3,
-    };
-    for (index, (azimuths, rule)) in LEVELS.iter().enumerate().skip(start) {
-        nodes.truncate(first);
-        border.truncate(first_border);
-        let Some(error) = sweep(&mut solver, at.sum, *azimuths, &RULES[*rule], border, nodes) else {
-            return fail(solver.evaluations, nodes, border);
+    let fit = solver.fit(at, extent);
+    if fit == Some(Fit::Predicted) {
+        let start = match tolerance {
+            t if t >= 2e-2 => 0,
+            t if t >= 2e-3 => 1,
+            t if t >= 2e-4 => 2,
+            _ => 3,
         };
-        // The roots are solved to a part of the tolerance.
-        let error = trust * error + SOLVING * tolerance;
-        let last = index + 1 == LEVELS.len();
-        if error <= tolerance || last && last_resort {
-            return Ok(Integrated { error, evaluations: solver.evaluations, frame: solver.frame });
+        for (azimuths, rule) in LEVELS.iter().skip(start) {
+            nodes.truncate(first);
+            border.truncate(first_border);
+            let Some(error) = sweep(&mut solver, at.sum, *azimuths, &RULES[*rule], border, nodes) else { break };
+            // The difference is that of a coarser rule: a smooth patch is at least four times better. The roots are
+            // solved to a part of the tolerance.
+            let error = 0.25 * error + SOLVING * tolerance;
+            if error <= tolerance {
+                return Ok(Integrated { error, evaluations: solver.evaluations, frame: solver.frame });
+            }
+            // Algebraic convergence does not pay here.
+            if error > 30.0 * tolerance {
+                break;
+            }
         }
-        // Algebraic convergence does not pay here: leave it to the subdivision.
-        if !last_resort && error > 30.0 * tolerance {
-            break;
+        nodes.truncate(first);
+        border.truncate(first_border);
+    }
+    let done = if fit.is_some() { halve(&mut solver, at.sum, tolerance, workspace, border, nodes) } else { None };
+    let Some(error) = done.filter(|error| last_resort || *error <= tolerance) else {
+        nodes.truncate(first);
+        border.truncate(first_border);
+        return Err(NotStarShaped { evaluations: solver.evaluations });
+    };
+    Ok(Integrated { error, evaluations: solver.evaluations, frame: solver.frame })
+}
+
+/// Integrates by halving, along each azimuth and over the azimuths. Gives the estimated relative error, or `None` when
+/// the patch is not star-shaped.
+fn halve(
+    solver: &mut Solver,
+    peak: f64,
+    tolerance: f64,
+    workspace: &mut Workspace,
+    borders: &mut Vec<f64>,
+    nodes: &mut Vec<Node>,
+) -> Option<f64> {
+    let Workspace { lines, nodes: pool, over_azimuths, along_radius } = workspace;
+    lines.clear();
+    pool.clear();
+    let part = 0.5 * (1.0 - SOLVING) * tolerance;
+    let over = over_azimuths.integrate(2.0 * std::f64::consts::PI, 8, part, MOST_AZIMUTHS, |angle| {
+        let direction = (libm::cos(angle), libm::sin(angle));
+        let (border, height) = solver.border(direction, peak, 0.0)?;
+        let first = pool.len();
+        let mut bay = false;
+        let along = along_radius.integrate(border, 2, part, MOST_RADII, |r| {
+            let (x, y) = (r * direction.0, r * direction.1);
+            let column = solver.column(x, y, height * (r / border).powi(2))?;
+            // Out of the contact before its border.
+            bay |= column.sum < -1e-3 * peak && r < border;
+            // Of the middle's no area a piece of no area.
+            let node = if r > 0.0 { solver.node(x, y, &column, r) } else { None };
+            pool.push(node.unwrap_or_default());
+            Some(pool[pool.len() - 1].force)
+        })?;
+        if bay {
+            return None;
+        }
+        for (node, point) in pool[first..].iter_mut().zip(&along_radius.points) {
+            *node = node.scaled(point.weight);
+        }
+        lines.push(Line { nodes: (first, pool.len()), border, error: along.error });
+        Some(along.sum)
+    })?;
+    let mut error = over.error;
+    for (line, point) in lines.iter().zip(&over_azimuths.points) {
+        error += line.error * point.weight;
+        let inside = pool[line.nodes.0..line.nodes.1].iter().filter(|node| node.area > 0.0);
+        nodes.extend(inside.map(|node| node.scaled(point.weight)));
+    }
+    // The first to be looked at are equally spaced.
+    borders.extend(lines.iter().take(32).map(|line| line.border));
+    Some(error / over.sum.norm().max(f64::MIN_POSITIVE) + SOLVING * tolerance)
+}
+
+/// Simpson's rule in one dimension, on intervals that are halved where that changes most. Their points are used again.
+#[derive(Debug, Default)]
+struct Halving {
+    points: Vec<Point>,
+    pieces: Vec<Piece>,
+}
+
+#[derive(Debug)]
+struct Point {
+    value: Vec3,
+    weight: f64,
+}
+
+#[derive(Debug)]
+struct Piece {
+    begin: f64,
+    length: f64,
+    /// Five points, equally spaced.
+    points: [usize; 5],
+    sum: Vec3,
+    error: f64,
+}
+
+/// An integral, and how far it may be off.
+struct Integral {
+    sum: Vec3,
+    error: f64,
+}
+
+/// Weights of Simpson's rule twice, on five points of an interval of length one.
+const TWICE: [f64; 5] = [1.0 / 12.0, 4.0 / 12.0, 2.0 / 12.0, 4.0 / 12.0, 1.0 / 12.0];
+/// And once, on every other point.
+const ONCE: [f64; 5] = [2.0 / 12.0, 0.0, 8.0 / 12.0, 0.0, 2.0 / 12.0];
+
+impl Halving {
+    /// Integrates a function from 0 to `length`, on `count` pieces first, to a relative tolerance or as far as `most`
+    /// points go. Calls it for the points in their order in `points`, which get their weights. `None` when it gives none.
+    fn integrate(
+        &mut self,
+        length: f64,
+        count: usize,
+        tolerance: f64,
+        most: usize,
+        mut f: impl FnMut(f64) -> Option<Vec3>,
+    ) -> Option<Integral> {
+        self.points.clear();
+        self.pieces.clear();
+        let step = length / (4 * count) as f64;
+        for index in 0..=4 * count {
+            self.add(index as f64 * step, &mut f)?;
+        }
+        for index in 0..count {
+            let points = [0, 1, 2, 3, 4].map(|k| 4 * index + k);
+            let piece = self.piece((4 * index) as f64 * step, 4.0 * step, points);
+            self.pieces.push(piece);
+        }
+        loop {
+            let sum: Vec3 = self.pieces.iter().map(|piece| piece.sum).sum();
+            let error: f64 = self.pieces.iter().map(|piece| piece.error).sum();
+            let worst = self.pieces.iter().map(|piece| piece.error).fold(0.0, f64::max);
+            if error <= tolerance * sum.norm() || self.points.len() >= most {
+                for piece in &self.pieces {
+                    for (point, weight) in piece.points.iter().zip(TWICE) {
+                        self.points[*point].weight += weight * piece.length;
+                    }
+                }
+                return Some(Integral { sum, error });
+            }
+            for index in 0..self.pieces.len() {
+                if self.pieces[index].error >= 0.3 * worst {
+                    self.split(index, &mut f)?;
+                }
+            }
         }
     }
-    fail(solver.evaluations, nodes, border)
+
+    fn add(&mut self, at: f64, f: &mut impl FnMut(f64) -> Option<Vec3>) -> Option<usize> {
+        let value = f(at)?;
+        self.points.push(Point { value, weight: 0.0 });
+        Some(self.points.len() - 1)
+    }
+
+    fn piece(&self, begin: f64, length: f64, points: [usize; 5]) -> Piece {
+        let sum = |weights: &[f64; 5]| -> Vec3 {
+            points.iter().zip(weights).map(|(point, weight)| self.points[*point].value * (weight * length)).sum()
+        };
+        let (twice, once) = (sum(&TWICE), sum(&ONCE));
+        Piece { begin, length, points, sum: twice, error: (twice - once).norm() }
+    }
+
+    fn split(&mut self, index: usize, f: &mut impl FnMut(f64) -> Option<Vec3>) -> Option<()> {
+        let Piece { begin, length, points: [a, b, c, d, e], .. } = self.pieces[index];
+        let at = |k: f64| begin + length * k / 8.0;
+        let new = [self.add(at(1.0), f)?, self.add(at(3.0), f)?, self.add(at(5.0), f)?, self.add(at(7.0), f)?];
+        self.pieces[index] = self.piece(begin, 0.5 * length, [a, new[0], b, new[1], c]);
+        let second = self.piece(begin + 0.5 * length, 0.5 * length, [c, new[2], d, new[3], e]);
+        self.pieces.push(second);
+        Some(())
+    }
 }
 
 /// Integrates with one rule. Gives how far, relatively, half the azimuths and the coarser radii are off, or `None` when the patch is not star-shaped.
@@ -211,7 +387,9 @@ fn sweep(
     let mut half = [Vec3::zeros(); 2];
     let mut coarse = Vec3::zeros();
     let direction = |azimuth: usize| {
-        let angle = slice * (azimuth as f64 + 0.5);
+        // The even azimuths and the odd ones are not each other's mirror image about an axis of the frame: their difference
+        // sees the corners of a symmetric patch.
+        let angle = slice * azimuth as f64;
         (libm::cos(angle), libm::sin(angle))
     };
     // The first azimuth is solved twice, so that all of a round patch start alike and none errs more than another.

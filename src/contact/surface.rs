@@ -38,6 +38,7 @@ pub struct Surface {
     cells: Vec<(i32, i32)>,
     outlines: Vec<(f64, f64)>,
     workspace: adaptive::Workspace,
+    polar: polar::Workspace,
     pieces: facets::Workspace,
 }
 
@@ -147,7 +148,7 @@ impl Surface {
             Covered::Polar(..) => {
                 let border = &self.borders[range.0..range.1];
                 let count = border.len() as f64;
-                let turn = libm::atan2(y, x) / (2.0 * std::f64::consts::PI) * count - 0.5;
+                let turn = libm::atan2(y, x) / (2.0 * std::f64::consts::PI) * count;
                 let below = turn.floor();
                 let at = |i: f64| border[i.rem_euclid(count) as usize];
                 let limit = at(below) + (turn - below) * (at(below + 1.0) - at(below));
@@ -171,6 +172,21 @@ impl Surface {
                 (0..outline.len()).all(behind) && height.abs() < reach
             }
         }
+    }
+
+    /// Notes the region of the last patch, and drops the patches before that it holds too: they would count twice.
+    fn cover(&mut self, region: Covered) {
+        let last = self.patches.len() - 1;
+        for index in (0..last).rev() {
+            if self.contains(&region, &self.patches[index].deepest) {
+                let (first, end) = self.patches.remove(index).nodes;
+                self.nodes.drain(first..end);
+                for patch in &mut self.patches[index..] {
+                    patch.nodes = (patch.nodes.0 - (end - first), patch.nodes.1 - (end - first));
+                }
+            }
+        }
+        self.covered.push(region);
     }
 
     /// What each patch comes to.
@@ -213,7 +229,7 @@ fn patch(pair: &Pair, settings: &Settings, at: &Deepest, extent: f64, out: &mut 
         match facets::integrate(pair, at, settings.tolerance, &mut out.pieces, &mut out.nodes, &mut out.outlines) {
             Ok(done) => {
                 out.push(at, first, pair.scale, done.error, done.evaluations, Scheme::Facets);
-                out.covered.push(Covered::Outline(done.frame, (first_corner, out.outlines.len())));
+                out.cover(Covered::Outline(done.frame, (first_corner, out.outlines.len())));
                 return true;
             }
             Err(facets::NoFacets { evaluations }) => spent = evaluations,
@@ -221,11 +237,18 @@ fn patch(pair: &Pair, settings: &Settings, at: &Deepest, extent: f64, out: &mut 
     }
     if settings.scheme != Scheme::Adaptive {
         let forced = settings.scheme == Scheme::Polar;
-        match polar::integrate(pair, at, extent, settings.tolerance, forced, &mut out.nodes, &mut out.borders) {
+        let Surface { polar, nodes, borders, .. } = out;
+        match polar::integrate(pair, at, extent, settings.tolerance, forced, polar, nodes, borders) {
             Ok(done) => {
-                out.push(at, first, pair.scale, done.error, done.evaluations + spent, Scheme::Polar);
-                out.covered.push(Covered::Polar(done.frame, (first_border, out.borders.len())));
-                return true;
+                let region = Covered::Polar(done.frame, (first_border, out.borders.len()));
+                // A border that was searched too far out may be another patch's.
+                if out.contains(&region, &at.position) {
+                    out.push(at, first, pair.scale, done.error, done.evaluations + spent, Scheme::Polar);
+                    out.cover(region);
+                    return true;
+                }
+                out.nodes.truncate(first);
+                spent += done.evaluations;
             }
             Err(polar::NotStarShaped { evaluations }) => spent += evaluations,
         }
@@ -234,7 +257,7 @@ fn patch(pair: &Pair, settings: &Settings, at: &Deepest, extent: f64, out: &mut 
     {
         Ok(done) => {
             out.push(at, first, pair.scale, done.error, done.evaluations + spent, Scheme::Adaptive);
-            out.covered.push(Covered::Cells(done.frame, (first_cell, out.cells.len())));
+            out.cover(Covered::Cells(done.frame, (first_cell, out.cells.len())));
             true
         }
         Err(adaptive::LeansOver { evaluations }) => {

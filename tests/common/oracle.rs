@@ -108,7 +108,7 @@ impl Oracle {
     /// Force on b, with `n` by `n` lines along each axis.
     pub fn force(&self, n: usize) -> Vec3 {
         let (low, high) = self.overlap();
-        const STEPS: usize = 24;
+        const STEPS: usize = 72;
         let mut force = Vec3::zeros();
         for axis in 0..3 {
             let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
