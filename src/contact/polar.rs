@@ -8,10 +8,12 @@
 //! Flat faces have corners, and a pressure that drops near the border: no fixed rule sees them. A patch that was not
 //! found to be smooth, or whose rules do not agree, is integrated by halving: along each azimuth, and over the azimuths.
 
+use super::Scheme;
 use super::column::{Fit, Frame, Solver};
 use super::deepest::Deepest;
 use super::pair::Pair;
 use super::patch::Node;
+use super::surface::Settings;
 use crate::math::Vec3;
 
 /// A rule for `∫₀¹ f(s) s ds` with `f(1) = 0`, exact to degree `2 n`; and a coarser one on the same points and the
@@ -166,24 +168,27 @@ pub struct Workspace {
 /// An azimuth, integrated along its radius.
 #[derive(Debug)]
 struct Line {
+    angle: f64,
     nodes: (usize, usize),
     border: f64,
+    /// Of the border.
+    height: f64,
     error: f64,
 }
 
-/// Integrates the patch round a deepest point to a relative `tolerance`, appending to `nodes`, and to `border` the
+/// Integrates the patch round a deepest point to the relative tolerance asked for, appending to `nodes`, and to `border` the
 /// radius of the border at equally spaced azimuths, in the frame's units. What does not meet the tolerance stands, with
-/// its estimate, when `last_resort` is set.
+/// its estimate, when no other scheme is to be used.
 pub fn integrate(
     pair: &Pair,
     at: &Deepest,
     extent: f64,
-    tolerance: f64,
-    last_resort: bool,
+    settings: &Settings,
     workspace: &mut Workspace,
     nodes: &mut Vec<Node>,
     border: &mut Vec<f64>,
 ) -> Result<Integrated, NotStarShaped> {
+    let tolerance = settings.tolerance;
     let (first, first_border) = (nodes.len(), border.len());
     let mut solver = Solver { pair, frame: Frame::new(at, [1.0, 1.0]), accept: 0.0, border_step: 0.0, evaluations: 0 };
     solver.aim(at.sum, tolerance);
@@ -202,6 +207,9 @@ pub fn integrate(
             // The difference is that of a coarser rule: a smooth patch is at least four times better. The roots are
             // solved to a part of the tolerance.
             let error = 0.25 * error + SOLVING * tolerance;
+            if !is_round(&border[first_border..]) {
+                break;
+            }
             if error <= tolerance {
                 return Ok(Integrated { error, evaluations: solver.evaluations, frame: solver.frame });
             }
@@ -214,12 +222,18 @@ pub fn integrate(
         border.truncate(first_border);
     }
     let done = if fit.is_some() { halve(&mut solver, at.sum, tolerance, workspace, border, nodes) } else { None };
-    let Some(error) = done.filter(|error| last_resort || *error <= tolerance) else {
+    let Some(error) = done.filter(|error| settings.scheme == Scheme::Polar || *error <= tolerance) else {
         nodes.truncate(first);
         border.truncate(first_border);
         return Err(NotStarShaped { evaluations: solver.evaluations });
     };
     Ok(Integrated { error, evaluations: solver.evaluations, frame: solver.frame })
+}
+
+/// Whether a border is near enough to a circle that a few azimuths tell all of it.
+fn is_round(border: &[f64]) -> bool {
+    let ends = border.iter().fold((f64::INFINITY, 0.0f64), |(low, high), s| (low.min(*s), high.max(*s)));
+    ends.0 > 0.6 * ends.1
 }
 
 /// Integrates by halving, along each azimuth and over the azimuths. Gives the estimated relative error, or `None` when
@@ -257,18 +271,38 @@ fn halve(
         for (node, point) in pool[first..].iter_mut().zip(&along_radius.points) {
             *node = node.scaled(point.weight);
         }
-        lines.push(Line { nodes: (first, pool.len()), border, error: along.error });
+        lines.push(Line { angle, nodes: (first, pool.len()), border, height, error: along.error });
         Some(along.sum)
     })?;
+    // The first to be looked at are equally spaced.
+    borders.extend(lines.iter().take(32).map(|line| line.border));
     let mut error = over.error;
     for (line, point) in lines.iter().zip(&over_azimuths.points) {
         error += line.error * point.weight;
         let inside = pool[line.nodes.0..line.nodes.1].iter().filter(|node| node.area > 0.0);
         nodes.extend(inside.map(|node| node.scaled(point.weight)));
     }
-    // The first to be looked at are equally spaced.
-    borders.extend(lines.iter().take(32).map(|line| line.border));
+    if !is_star_shaped(solver, lines) {
+        return None;
+    }
     Some(error / over.sum.norm().max(f64::MIN_POSITIVE) + SOLVING * tolerance)
+}
+
+/// Whether there is nothing behind the border: where it jumps from one azimuth to the next, there may be a bay, and
+/// contact again beyond it. Puts the azimuths in order.
+fn is_star_shaped(solver: &mut Solver, lines: &mut [Line]) -> bool {
+    lines.sort_by(|a, b| a.angle.total_cmp(&b.angle));
+    lines.windows(2).all(|pair| {
+        let (short, long) = if pair[0].border < pair[1].border { (&pair[0], &pair[1]) } else { (&pair[1], &pair[0]) };
+        if long.border < 1.05 * short.border {
+            return true;
+        }
+        let (x, y) = (libm::cos(short.angle), libm::sin(short.angle));
+        [0.3, 0.6, 0.9].into_iter().all(|part| {
+            let r = short.border + part * (long.border - short.border);
+            solver.column(r * x, r * y, long.height).is_none_or(|column| column.sum <= 0.0)
+        })
+    })
 }
 
 /// Simpson's rule in one dimension, on intervals that are halved where that changes most. Their points are used again.

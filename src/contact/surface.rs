@@ -236,9 +236,8 @@ fn patch(pair: &Pair, settings: &Settings, at: &Deepest, extent: f64, out: &mut 
         }
     }
     if settings.scheme != Scheme::Adaptive {
-        let forced = settings.scheme == Scheme::Polar;
         let Surface { polar, nodes, borders, .. } = out;
-        match polar::integrate(pair, at, extent, settings.tolerance, forced, polar, nodes, borders) {
+        match polar::integrate(pair, at, extent, settings, polar, nodes, borders) {
             Ok(done) => {
                 let region = Covered::Polar(done.frame, (first_border, out.borders.len()));
                 // A border that was searched too far out may be another patch's.
