@@ -383,11 +383,11 @@ impl Work<'_, '_> {
                     hardness += vertex.stiffness * weight;
                 }
                 let unit = (side * part).powi(2);
-                let Reading { covered, pressed, .. } = read;
+                let pressed = bound.map_or(read.pressed, |bound| read.pressed.min(bound));
                 force += density * (scale * pressed * unit);
                 doubt += bound.unwrap_or(read.doubt) * density.norm() * scale * unit;
-                area += density.norm() * covered * unit;
-                stiffness += hardness * covered * unit;
+                area += density.norm() * read.covered * unit;
+                stiffness += hardness * read.covered * unit;
                 load += pressed;
                 for (sum, value) in moment.iter_mut().zip([x, y, height]) {
                     *sum += pressed * value;
@@ -526,18 +526,18 @@ impl Reading {
             }
         }
         let positive = |value: f64, gradient: [f64; 2]| positive_part(value, gradient.map(|slope| slope * side * part));
-        let (mut value, mut gradient) =
-            (0.5 * (joined + blended), [0, 1].map(|axis| 0.5 * (slope_joined[axis] + slope_blended[axis])));
-        let doubt = if inside {
-            0.5 * (blended - joined).abs()
-        } else {
-            if value > below {
-                (value, gradient) = (below, slope_below);
-            }
-            let least = positive(joined, slope_joined).1;
-            if below.is_finite() { (positive(below, slope_below).1 - least).abs() } else { least }
-        };
-        let (covered, pressed) = positive(value, gradient);
+        let mean = |x: [f64; 2], y: [f64; 2]| [0, 1].map(|axis| 0.5 * (x[axis] + y[axis]));
+        let (covered, pressed) = positive(0.5 * (joined + blended), mean(slope_joined, slope_blended));
+        if inside {
+            return Self { covered, pressed, doubt: 0.5 * (blended - joined).abs() };
+        }
+        let least = positive(joined, slope_joined).1;
+        if below == f64::INFINITY {
+            return Self { covered, pressed, doubt: least };
+        }
+        let most = positive(below, slope_below);
+        let doubt = (most.1 - least).abs();
+        let (covered, pressed) = if pressed > most.1 { most } else { (covered, pressed) };
         Self { covered, pressed, doubt }
     }
 }

@@ -177,9 +177,11 @@ impl Solver<'_> {
     pub fn fit(&mut self, at: &Deepest, extent: f64) -> Option<Fit> {
         let predicted = at.curvature.map(|c| if c < 0.0 { (2.0 * at.sum / -c).sqrt().min(extent) } else { extent });
         self.frame.scale = predicted;
+        // Where the pressure is flat nothing was predicted.
+        let curved = predicted.iter().all(|scale| *scale < extent);
         for round in 0..4 {
             if let Look::Round = self.look_round(at.sum)? {
-                return Some(if round == 0 { Fit::Predicted } else { Fit::Measured });
+                return Some(if round == 0 && curved { Fit::Predicted } else { Fit::Measured });
             }
         }
         Some(Fit::Measured)
