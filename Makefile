@@ -199,6 +199,12 @@ comma := ,
 .PHONY: extremes
 extremes: ## all rows of the stability tables, into docs/extremes.md (takes long)
 	$(CARGO) test --release --test extremes -- --ignored --nocapture
+	@if $(PKG_CONFIG) --exists bullet-float64 2>/dev/null; then \
+		$(MAKE) $(WORK)/tests/cpp/bullet_extremes-double && \
+		$(WORK)/tests/cpp/bullet_extremes-double table | tee -a docs/extremes.md; \
+	else \
+		echo 'No rows under Bullet: libbullet-dev is missing.'; \
+	fi
 
 .PHONY: bench
 bench: ## measure
