@@ -9,7 +9,7 @@ use super::guard::{free, isocoat_world, read, write};
 use super::handle::{isocoat_body, isocoat_link};
 use super::pointer::{List, Out};
 use super::status::{Checked, isocoat_status};
-use super::world::{isocoat_response, response_from_c, response_to_c, unknown};
+use super::world::{flag, isocoat_response, response_from_c, response_to_c, unknown};
 use crate::world::{BodyDesc, StiffnessRule};
 
 /// What a body is made of: an ISOCOAT_BODY_ value.
@@ -71,6 +71,10 @@ pub struct isocoat_body_desc {
     pub contact_frequency: f64,
     /// With ISOCOAT_STIFFNESS_FREQUENCY: damping over the critical one, from 0 to 10; replaces dissipation. Default 0.
     pub damping_ratio: f64,
+    /// 1 if it may fall asleep where the world lets bodies sleep, else 0. Default 1.
+    pub may_sleep: u32,
+    /// 0.
+    pub reserved: u32,
 }
 
 // SAFETY: `repr(C)`, the size first, numbers and a pointer that is never followed.
@@ -114,6 +118,8 @@ impl From<&BodyDesc> for isocoat_body_desc {
             static_sink,
             contact_frequency,
             damping_ratio,
+            may_sleep: desc.may_sleep.into(),
+            reserved: 0,
         }
     }
 }
@@ -144,6 +150,7 @@ impl isocoat_body_desc {
             mask: self.mask,
             user_data: self.user_data as usize,
             response: response_from_c(self.response)?,
+            may_sleep: flag("may_sleep", self.may_sleep)?,
         })
     }
 }

@@ -3,9 +3,10 @@
 //! Each link's own block is the preconditioner, which takes masses, lengths and stiffnesses of any ratio out of the
 //! count; what remains goes with the longest way through the island.
 
-use nalgebra::{Cholesky, Const, Matrix6, Vector6};
+use nalgebra::{Matrix6, Vector6};
 
 use super::envelope::BLOCK;
+use crate::team::Team;
 
 /// The system.
 #[derive(Debug, Default)]
@@ -13,9 +14,36 @@ pub struct Blocks {
     diagonal: Vec<Matrix6<f64>>,
     /// Row, column below the diagonal, block.
     couplings: Vec<(u32, u32, Matrix6<f64>)>,
-    factors: Vec<Cholesky<f64, Const<6>>>,
-    buffers: [Vec<Vector6<f64>>; 4],
+    inverses: Vec<Matrix6<f64>>,
+    rows: Vec<Row>,
+    direction: Vec<Vector6<f64>>,
+    /// The couplings row by row, with those above the diagonal, and where each row's begin.
+    entries: Vec<Entry>,
+    starts: Vec<u32>,
 }
+
+/// What the iteration keeps of a row of blocks.
+#[derive(Clone, Copy, Debug, Default)]
+struct Row {
+    x: Vector6<f64>,
+    residual: Vector6<f64>,
+    eased: Vector6<f64>,
+    image: Vector6<f64>,
+    /// The row's part of a product.
+    part: f64,
+}
+
+/// A coupling as one of its two rows sees it.
+#[derive(Clone, Copy, Debug, Default)]
+struct Entry {
+    coupling: u32,
+    other: u32,
+    /// The row is the one of the transposed block.
+    transposed: bool,
+}
+
+/// Rows that a worker takes in one go.
+const ROWS: usize = 16;
 
 impl Blocks {
     /// All zero, for `count` blocks.
@@ -36,67 +64,86 @@ impl Blocks {
 
     /// Solves in place, to `tolerance` of the right side in the preconditioner's measure. False when a diagonal block
     /// is not positive definite.
-    pub fn solve(&mut self, x: &mut [f64], tolerance: f64, most: usize) -> bool {
-        let Self { diagonal, couplings, factors, buffers } = self;
-        factors.clear();
-        for block in diagonal.iter() {
+    pub fn solve(&mut self, x: &mut [f64], tolerance: f64, most: usize, team: &Team) -> bool {
+        self.inverses.clear();
+        for block in &self.diagonal {
             let Some(factor) = block.cholesky() else { return false };
-            factors.push(factor);
+            self.inverses.push(factor.inverse());
         }
-        let [residual, eased, direction, image] = buffers;
-        for buffer in [&mut *residual, &mut *eased, &mut *direction, &mut *image] {
-            buffer.clear();
-            buffer.resize(diagonal.len(), Vector6::zeros());
-        }
-        for (residual, x) in residual.iter_mut().zip(x.chunks_exact_mut(BLOCK)) {
-            *residual = Vector6::from_column_slice(x);
-            x.fill(0.0);
-        }
-        let ease = |residual: &[Vector6<f64>], eased: &mut [Vector6<f64>]| -> f64 {
-            let mut sum = 0.0;
-            for ((residual, eased), factor) in residual.iter().zip(eased).zip(factors.iter()) {
-                *eased = *residual;
-                factor.solve_mut(eased);
-                sum += residual.dot(eased);
-            }
-            sum
-        };
-        let mut size = ease(residual, eased);
+        self.list_entries();
+        let Self { diagonal, couplings, inverses, rows, direction, entries, starts } = self;
+        rows.clear();
+        rows.extend(x.chunks_exact(BLOCK).zip(inverses.iter()).map(|(x, inverse)| {
+            let residual = Vector6::from_column_slice(x);
+            let eased = inverse * residual;
+            Row { residual, eased, part: residual.dot(&eased), ..Row::default() }
+        }));
+        direction.clear();
+        direction.extend(rows.iter().map(|row| row.eased));
+        let sum = |rows: &[Row]| -> f64 { rows.iter().map(|row| row.part).sum() };
+        let mut size = sum(rows);
         let enough = tolerance * tolerance * size;
-        direction.copy_from_slice(eased);
         for _ in 0..most {
             if size <= enough {
                 break;
             }
-            for ((image, direction), block) in image.iter_mut().zip(direction.iter()).zip(diagonal.iter()) {
-                *image = block * direction;
-            }
-            for (i, j, block) in couplings.iter() {
-                let (i, j) = (*i as usize, *j as usize);
-                image[i] += block * direction[j];
-                image[j] += block.tr_mul(&direction[i]);
-            }
-            let bend: f64 = direction.iter().zip(image.iter()).map(|(d, i)| d.dot(i)).sum();
+            team.each_mut(rows, ROWS, |index, row| {
+                let mut image = diagonal[index] * direction[index];
+                for entry in &entries[starts[index] as usize..starts[index + 1] as usize] {
+                    let (block, other) = (&couplings[entry.coupling as usize].2, &direction[entry.other as usize]);
+                    image += if entry.transposed { block.tr_mul(other) } else { block * other };
+                }
+                (row.image, row.part) = (image, direction[index].dot(&image));
+            });
+            let bend = sum(rows);
             if bend <= 0.0 {
                 break;
             }
             let part = size / bend;
-            for (x, direction) in x.chunks_exact_mut(BLOCK).zip(direction.iter()) {
-                for (x, direction) in x.iter_mut().zip(direction.iter()) {
-                    *x += part * direction;
-                }
-            }
-            for (residual, image) in residual.iter_mut().zip(image.iter()) {
-                *residual -= image * part;
-            }
-            let next = ease(residual, eased);
+            team.each_mut(rows, ROWS, |index, row| {
+                row.x += direction[index] * part;
+                row.residual -= row.image * part;
+                row.eased = inverses[index] * row.residual;
+                row.part = row.residual.dot(&row.eased);
+            });
+            let next = sum(rows);
             let turn = next / size;
             size = next;
-            for (direction, eased) in direction.iter_mut().zip(eased.iter()) {
-                *direction = eased + *direction * turn;
+            for (direction, row) in direction.iter_mut().zip(rows.iter()) {
+                *direction = row.eased + *direction * turn;
             }
         }
+        for (x, row) in x.chunks_exact_mut(BLOCK).zip(rows.iter()) {
+            x.copy_from_slice(row.x.as_slice());
+        }
         true
+    }
+
+    /// Lists the couplings of each row, in the order in which they were added.
+    fn list_entries(&mut self) {
+        let Self { diagonal, couplings, entries, starts, .. } = self;
+        starts.clear();
+        starts.resize(diagonal.len() + 2, 0);
+        for (i, j, _) in couplings.iter() {
+            starts[*i as usize + 2] += 1;
+            starts[*j as usize + 2] += 1;
+        }
+        for row in 2..starts.len() {
+            starts[row] += starts[row - 1];
+        }
+        entries.clear();
+        entries.resize(2 * couplings.len(), Entry::default());
+        // Filling moves each row's start, kept one place up meanwhile, to the next one's.
+        let mut list = |row: u32, entry: Entry| {
+            let place = &mut starts[row as usize + 1];
+            entries[*place as usize] = entry;
+            *place += 1;
+        };
+        for (coupling, (i, j, _)) in couplings.iter().enumerate() {
+            let coupling = coupling as u32;
+            list(*i, Entry { coupling, other: *j, transposed: false });
+            list(*j, Entry { coupling, other: *i, transposed: true });
+        }
     }
 }
 
@@ -130,7 +177,7 @@ mod tests {
         let (mut direct, mut iterated) = (right.clone(), right);
         assert!(envelope.factor());
         envelope.solve(&mut direct);
-        assert!(blocks.solve(&mut iterated, 1e-12, 1000));
+        assert!(blocks.solve(&mut iterated, 1e-12, 1000, &Team::alone()));
         let off = direct.iter().zip(&iterated).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(off < 1e-9 * direct.iter().fold(0.0, |m: f64, x| m.max(x.abs())), "{off}");
     }

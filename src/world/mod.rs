@@ -19,13 +19,14 @@ pub use desc::{
     BodyDesc, BodyId, LinkDesc, LinkId, Response, Scheme, SkeletonDesc, SkeletonId, StiffnessRule, VelocityConvention,
     WorldDesc,
 };
-pub use events::{Contact, Counters, Event, EventKind, LogLevel};
+pub use events::{Contact, Counters, Event, EventKind, LogLevel, Tally, Times};
 
 use crate::base::link::Kind;
 use crate::error::{Error, Result, require_finite};
 use crate::field::Profile;
 use crate::math::{Pose, Twist, Vec3, Wrench};
 use crate::response::mirror::Mirror;
+use crate::team::{Alone, Tasks};
 
 /// A body as the world keeps it.
 pub struct Body {
@@ -114,8 +115,9 @@ pub struct World {
     bodies: Arena<Body>,
     links: Arena<Link>,
     skeletons: Arena<Skeleton>,
-    log: Option<Log>,
-    pair_filter: Option<PairFilter>,
+    log: Alone<Option<Log>>,
+    pair_filter: Alone<Option<PairFilter>>,
+    tasks: Alone<Option<Box<dyn Tasks>>>,
     stepping: step::Stepping,
 }
 
@@ -133,8 +135,9 @@ impl World {
             bodies: Arena::new(tag),
             links: Arena::new(tag),
             skeletons: Arena::new(tag),
-            log: None,
-            pair_filter: None,
+            log: Alone::default(),
+            pair_filter: Alone::default(),
+            tasks: Alone::default(),
             stepping: step::Stepping::default(),
         })
     }
@@ -161,12 +164,18 @@ impl World {
 
     /// Sets who receives messages.
     pub fn set_log(&mut self, log: Option<Log>) {
-        self.log = log;
+        *self.log.get_mut() = log;
     }
 
     /// Sets who decides about pairs, after categories and masks.
     pub fn set_pair_filter(&mut self, filter: Option<PairFilter>) {
-        self.pair_filter = filter;
+        *self.pair_filter.get_mut() = filter;
+    }
+
+    /// Sets whose threads help with the steps; without, a step is the work of the thread that calls it. Results are the
+    /// same bits for any number of workers.
+    pub fn set_tasks(&mut self, tasks: Option<Box<dyn Tasks>>) {
+        *self.tasks.get_mut() = tasks;
     }
 
     /// All bodies, in the order of their slots.
@@ -572,5 +581,10 @@ impl World {
             skeletons: self.skeletons.len() as u32,
             ..self.stepping.counters()
         }
+    }
+
+    /// Where the time of the last step went, if [`WorldDesc::timed`] asks for it.
+    pub fn times(&self) -> Times {
+        self.stepping.times()
     }
 }

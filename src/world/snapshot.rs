@@ -30,9 +30,10 @@ use crate::handle::{Arena, Noun, RawId, Slot, WorldTag};
 use crate::math::{Pose, Twist, Wrench};
 use crate::response::mirror::Mirror;
 use crate::response::{Response, VelocityConvention};
+use crate::team::Alone;
 
 /// What the lists below say. Another number is refused: no snapshot is ever half understood.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 const MAGIC: [u8; 8] = *b"isocoat\0";
 /// Offsets of the parts of the header.
 const FORMAT_AT: usize = 8;
@@ -55,11 +56,11 @@ const VERSION: [u8; LENGTH_AT - VERSION_AT] = {
 structs! {
     WorldDesc {
         gravity, response, scheme, force_tolerance, seed_count, max_substeps, substep_phase, implicit_rounds,
-        implicit_splits, implicit_tolerance,
+        implicit_splits, implicit_tolerance, sleep_time, sleep_speed, timed,
     }
     BodyDesc {
         rigid, response, isovalue, stiffness_scale, stiffness, friction, static_friction, viscous_friction, dissipation,
-        category, mask, user_data,
+        category, mask, may_sleep, user_data,
     }
     LinkDesc {
         kind, pose, twist, mass, local_center, inertia, gravity_scale, external_acceleration,
@@ -249,7 +250,7 @@ impl World {
     }
 
     fn write(&self, out: &mut impl Sink) {
-        let Self { desc, origin, own_tag: _, bodies, links, skeletons, log: _, pair_filter: _, stepping } = self;
+        let Self { desc, origin, own_tag: _, bodies, links, skeletons, log: _, pair_filter: _, tasks: _, stepping } = self;
         origin.write(out);
         desc.write(out);
         write_arena(bodies, out);
@@ -279,8 +280,9 @@ impl World {
             bodies: read_arena(&mut from)?,
             links: read_arena(&mut from)?,
             skeletons: read_arena(&mut from)?,
-            log: None,
-            pair_filter: None,
+            log: Alone::default(),
+            pair_filter: Alone::default(),
+            tasks: Alone::default(),
             stepping: step::Stepping::default(),
         };
         let mut memories: Vec<Memory> = from.read("pairs of bodies")?;
@@ -311,7 +313,7 @@ impl World {
             id.world = tag;
         }
         fresh.take_rays_of(self);
-        let World { desc, origin, own_tag: _, bodies, links, skeletons, log: _, pair_filter: _, stepping: _ } = fresh;
+        let World { desc, origin, own_tag: _, bodies, links, skeletons, log: _, pair_filter: _, tasks: _, stepping: _ } = fresh;
         (self.desc, self.origin) = (desc, origin);
         (self.bodies, self.links, self.skeletons) = (bodies, links, skeletons);
         self.stepping.restart(memories);
