@@ -322,6 +322,44 @@ pub unsafe extern "C" fn isocoat_body_is_enabled(
     }
 }
 
+/// Whether a body is awake; those that cannot move always are. See isocoat_world_desc::sleep_time.
+///
+/// - world: not NULL.
+/// - body: the body.
+/// - awake: receives the answer; not NULL.
+///
+/// Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
+#[must_use]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn isocoat_body_is_awake(
+    world: *const isocoat_world,
+    body: isocoat_body,
+    awake: *mut bool,
+) -> isocoat_status {
+    // SAFETY: the pointers are NULL or as their lines say.
+    unsafe {
+        read(world, |inner| {
+            let out = Out::new(awake, "awake")?;
+            out.put(inner.world.body_is_awake(body.into())?);
+            Ok(())
+        })
+    }
+}
+
+/// Wakes a body with all that sleep with it; of one that cannot move, those that lean on it. Touch, and whatever the
+/// host changes about a body, wake it by themselves.
+///
+/// - world: not NULL.
+/// - body: the body.
+///
+/// Errors: INVALID_HANDLE. Threads: changes the world.
+#[must_use]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn isocoat_body_wake(world: *mut isocoat_world, body: isocoat_body) -> isocoat_status {
+    // SAFETY: NULL or a live world.
+    unsafe { write(world, |inner| Ok(inner.world.wake_body(body.into())?)) }
+}
+
 /// The host's own pointer of a body.
 ///
 /// - world: not NULL.

@@ -122,12 +122,17 @@ impl From<&Event> for isocoat_event {
 pub(super) struct Views {
     contacts: Vec<isocoat_contact>,
     events: Vec<isocoat_event>,
+    /// The revision of the contacts at rest that are at the front.
+    resting: u64,
 }
 
 impl Views {
     pub fn refresh(&mut self, world: &World) {
-        self.contacts.clear();
-        self.contacts.extend(world.contacts().iter().map(isocoat_contact::from));
+        // Contacts at rest stay where they are.
+        let (resting, revision) = world.resting_contacts();
+        let kept = if std::mem::replace(&mut self.resting, revision) == revision { resting } else { 0 };
+        self.contacts.truncate(kept);
+        self.contacts.extend(world.contacts()[kept..].iter().map(isocoat_contact::from));
         self.events.clear();
         self.events.extend(world.events().iter().map(isocoat_event::from));
     }
@@ -296,7 +301,8 @@ pub unsafe extern "C" fn isocoat_counters_init(counters: *mut isocoat_counters, 
     free(|| unsafe { descriptor::init(counters, size, "counters") })
 }
 
-/// The contacts of the last step; of a sub-stepped one, as they were in its last sub-step.
+/// The contacts of the last step; of a sub-stepped one, as they were in its last sub-step; of bodies asleep, as they
+/// were when these fell asleep. The last come first.
 ///
 /// - world: not NULL.
 /// - contacts: receives a pointer to them (not to be freed); not NULL.

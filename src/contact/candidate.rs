@@ -63,7 +63,19 @@ impl Placement {
 impl Candidate {
     /// What a snapshot keeps. The rest is made anew in each step; whoever adds a field decides here.
     pub fn lasting(&self) -> &Memory {
-        let Self { bodies: _, lead: _, close: _, pair: _, material: _, surface: _, nodes: _, reference: _, fresh: _, loads: _, memory } = self;
+        let Self {
+            bodies: _,
+            lead: _,
+            close: _,
+            pair: _,
+            material: _,
+            surface: _,
+            nodes: _,
+            reference: _,
+            fresh: _,
+            loads: _,
+            memory,
+        } = self;
         memory
     }
 

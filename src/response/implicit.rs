@@ -236,14 +236,7 @@ impl Solver {
     }
 
     /// The velocities at the start of the step, without what would carry bodies into each other.
-    fn first_guess(
-        &mut self,
-        motions: &[Motion],
-        island: &Island,
-        candidates: &mut [Candidate],
-        h: f64,
-        team: &Team,
-    ) {
+    fn first_guess(&mut self, motions: &[Motion], island: &Island, candidates: &mut [Candidate], h: f64, team: &Team) {
         for link in &island.links {
             self.trial[*link as usize] = motions[*link as usize];
         }

@@ -73,8 +73,7 @@ impl Rules {
             }
             Response::Auto | Response::Substepped => {
                 let wanted = group.substeps;
-                let substeps =
-                    substepped::step(motions, island, candidates, *dt, settings, limits, wanted, work, team);
+                let substeps = substepped::step(motions, island, candidates, *dt, settings, limits, wanted, work, team);
                 Outcome { substeps, ..Outcome::default() }
             }
         };
@@ -171,8 +170,7 @@ impl World {
             let (mut response, forced) = self.choose(&state.islands[index].island, state);
             if response == Response::Substepped {
                 let (island, rates) = (&state.islands[index].island, &mut state.rates);
-                let wanted =
-                    substepped::plan(&state.motions, island, &mut state.candidates, dt, &rules.limits, rates);
+                let wanted = substepped::plan(&state.motions, island, &mut state.candidates, dt, &rules.limits, rates);
                 // Too few sub-steps would gain energy without end.
                 if wanted > f64::from(rules.limits.most) && !forced {
                     response = Response::Implicit;
@@ -210,11 +208,8 @@ impl World {
     fn gather_up(&mut self, state: &mut Stepping, limits: &substepped::Limits) {
         let Stepping { islands, workers, motions, candidates, .. } = state;
         let groups = &mut islands[..state.island_count];
-        let mut counters = Counters {
-            pairs: candidates.len() as u32,
-            islands: groups.len() as u32,
-            ..Counters::default()
-        };
+        let mut counters =
+            Counters { pairs: candidates.len() as u32, islands: groups.len() as u32, ..Counters::default() };
         let mut short = 0.0f64;
         for group in groups.iter_mut() {
             if group.beside {
@@ -264,7 +259,7 @@ impl World {
             }
         }
         for index in 0..self.bodies.capacity() {
-            if self.bodies.is_live(index) {
+            if self.bodies.is_live(index) && !self.bodies[index].is_asleep() {
                 let body = &mut self.bodies[index];
                 body.stacked = if state.touches[index] >= 2 { STACKED } else { body.stacked.saturating_sub(1) };
             }

@@ -12,8 +12,8 @@ use crate::contact::candidate::{Candidate, Memory};
 use crate::contact::{pair::Side, surface};
 use crate::error::{Result, require};
 use crate::math::{Quat, Vec3, Wrench};
-use crate::response::mirror::Host;
 use crate::response::Response;
+use crate::response::mirror::Host;
 use crate::response::substep::Island;
 use crate::team::Team;
 
@@ -27,14 +27,22 @@ pub(crate) struct Stepping {
     pub(super) motions: Vec<Motion>,
     /// How each link was moved, by slot.
     pub(super) responses: Vec<Response>,
-    bounds: Vec<Bounds>,
-    bounds_of: Vec<usize>,
-    pairs: Vec<[u32; 2]>,
+    pub(super) bounds: Vec<Bounds>,
+    pub(super) bounds_of: Vec<usize>,
+    pub(super) pairs: Vec<[u32; 2]>,
     /// In the order of their bodies.
     pub(super) candidates: Vec<Candidate>,
     /// Those of the last step, then their memory for reuse.
     previous: Vec<Candidate>,
-    spare: Vec<Candidate>,
+    pub(super) spare: Vec<Candidate>,
+    /// Of the pairs that are asleep, in the order of their bodies.
+    pub(super) resting: Vec<Memory>,
+    /// How many contacts at the front are of bodies asleep, and a number that changes whenever these do.
+    pub(super) resting_contacts: usize,
+    pub(super) rest_revision: u64,
+    /// The motions of links asleep are in place.
+    settled: bool,
+    pub(super) probe: Candidate,
     pub(super) islands: Vec<Group>,
     pub(super) island_count: usize,
     roots: Vec<u32>,
@@ -44,7 +52,7 @@ pub(crate) struct Stepping {
     pub(super) rates: Vec<f64>,
     /// Working memory of each worker; the first always is the thread that steps.
     pub(super) workers: Vec<Mutex<Worker>>,
-    contacts: Vec<Contact>,
+    pub(super) contacts: Vec<Contact>,
     events: Vec<Event>,
     pub(super) counters: Counters,
     pub(super) times: Times,
@@ -85,6 +93,10 @@ impl Stepping {
         &self.contacts
     }
 
+    pub fn resting_contacts(&self) -> (usize, u64) {
+        (self.resting_contacts, self.rest_revision)
+    }
+
     pub fn events(&self) -> &[Event] {
         &self.events
     }
@@ -98,9 +110,14 @@ impl Stepping {
     }
 
     /// What a snapshot keeps. The rest are buffers and reports; whoever adds a field decides here.
-    pub fn lasting(&self) -> &[Candidate] {
+    pub fn lasting(&self) -> (&[Candidate], &[Memory], &[Contact]) {
         let Self {
             candidates,
+            resting,
+            resting_contacts,
+            rest_revision: _,
+            settled: _,
+            probe: _,
             motions: _,
             responses: _,
             bounds: _,
@@ -115,16 +132,17 @@ impl Stepping {
             touches: _,
             rates: _,
             workers: _,
-            contacts: _,
+            contacts,
             events: _,
             counters: _,
             times: _,
         } = self;
-        candidates
+        (candidates, resting, &contacts[..*resting_contacts])
     }
 
-    /// Goes on from what a snapshot has kept, in the buffers that are there. Nothing is reported until the next step.
-    pub fn restart(&mut self, memories: Vec<Memory>) {
+    /// Goes on from what a snapshot has kept, in the buffers that are there. Until the next step nothing is reported but
+    /// the contacts of those who sleep.
+    pub fn restart(&mut self, memories: Vec<Memory>, resting: Vec<Memory>, contacts: Vec<Contact>) {
         // Whose buffers a candidate has does not matter: those that stay where they are need not be moved.
         while self.candidates.len() < memories.len() {
             self.candidates.push(self.spare.pop().unwrap_or_default());
@@ -134,15 +152,18 @@ impl Stepping {
             candidate.bodies = memory.ids.map(|id| id.index);
             candidate.memory = memory;
         }
-        self.contacts.clear();
+        (self.resting, self.settled) = (resting, false);
+        (self.resting_contacts, self.contacts) = (contacts.len(), contacts);
+        self.rest_revision += 1;
         self.events.clear();
         (self.counters, self.times) = (Counters::default(), Times::default());
     }
 
     /// What the contacts of a body went through no longer counts: it was put elsewhere.
     pub fn forget_contacts_of(&mut self, body: u32) {
-        for candidate in self.candidates.iter_mut().filter(|candidate| candidate.bodies.contains(&body)) {
-            candidate.memory.forget_history();
+        let memories = self.candidates.iter_mut().map(|candidate| &mut candidate.memory).chain(&mut self.resting);
+        for memory in memories.filter(|memory| memory.ids.iter().any(|id| id.index == body)) {
+            memory.forget_history();
         }
     }
 }
@@ -175,6 +196,7 @@ impl World {
         clock.lap(&mut times.respond);
         self.finish(state, dt);
         self.report(state);
+        self.let_sleep(state, dt);
         clock.lap(&mut times.report);
         whole.lap(&mut times.step);
         for worker in &mut state.workers {
@@ -187,11 +209,11 @@ impl World {
 
     /// Motions from the descriptors, host-driven ones through their mirrors; the host's pushes on our own.
     fn begin(&mut self, state: &mut Stepping, dt: f64) {
-        state.motions.clear();
+        let settled = std::mem::replace(&mut state.settled, true);
         state.motions.resize(self.links.capacity(), Motion::default());
         state.rates.resize(self.links.capacity(), 0.0);
         for index in 0..self.links.capacity() {
-            if !self.links.is_live(index) {
+            if !self.links.is_live(index) || settled && self.sleeps(&self.links[index]) {
                 continue;
             }
             let mut motion = self.motion_of(&self.links[index]);
@@ -230,9 +252,13 @@ impl World {
         for (position, bounds) in state.bounds.iter().enumerate() {
             state.bounds_of[bounds.body as usize] = position;
         }
+        self.wake_touched(state, dt);
         std::mem::swap(&mut state.candidates, &mut state.previous);
         let mut filter = self.pair_filter.get_mut().take();
-        state.pairs.retain(|pair| self.may_touch(pair, &state.motions, &mut filter));
+        state.pairs.retain(|pair| {
+            let asleep = pair.iter().any(|body| self.bodies[*body as usize].is_asleep());
+            !asleep && self.may_touch(pair, &state.motions, &mut filter)
+        });
         *self.pair_filter.get_mut() = filter;
         let mut old = 0;
         for pair in &state.pairs {
@@ -265,7 +291,12 @@ impl World {
         }
     }
 
-    fn may_touch(&self, pair: &[u32; 2], motions: &[Motion], filter: &mut Option<super::PairFilter>) -> bool {
+    pub(super) fn may_touch(
+        &self,
+        pair: &[u32; 2],
+        motions: &[Motion],
+        filter: &mut Option<super::PairFilter>,
+    ) -> bool {
         let [a, b] = pair.map(|body| &self.bodies[body as usize]);
         // A host-driven kinematic link may still have its wrench asked for: only bodies that are fixed all over are
         // skipped.
@@ -307,8 +338,10 @@ impl World {
             }
             body
         }
-        let movable =
-            |body: u32| self.bodies[body as usize].links.iter().any(|link| state.motions[*link as usize].is_movable());
+        let movable = |body: u32| {
+            let body = &self.bodies[body as usize];
+            !body.is_asleep() && body.links.iter().any(|link| state.motions[*link as usize].is_movable())
+        };
         for candidate in &state.candidates {
             let [a, b] = candidate.bodies;
             if movable(a) && movable(b) {
@@ -376,7 +409,7 @@ impl World {
     /// Writes back what moved, and what the host is to do.
     fn finish(&mut self, state: &mut Stepping, dt: f64) {
         for index in 0..self.links.capacity() {
-            if !self.links.is_live(index) {
+            if !self.links.is_live(index) || self.sleeps(&self.links[index]) {
                 continue;
             }
             let motion = &state.motions[index];
@@ -404,6 +437,10 @@ impl World {
         }
     }
 
+    fn sleeps(&self, link: &Link) -> bool {
+        self.bodies[link.body as usize].is_asleep()
+    }
+
     /// What of a host-driven link matters to its mirror.
     pub(super) fn host(&self, link: &Link) -> Host {
         Host {
@@ -416,7 +453,7 @@ impl World {
 
     /// Contacts and events.
     fn report(&mut self, state: &mut Stepping) {
-        state.contacts.clear();
+        self.keep_resting_contacts(state);
         state.events.clear();
         // Pairs that are no longer candidates cannot touch.
         for mut gone in state.previous.drain(..) {
