@@ -9,7 +9,7 @@ use super::guard::{free, isocoat_world, read, write};
 use super::handle::{isocoat_body, isocoat_link};
 use super::pointer::{List, Out};
 use super::status::{Checked, isocoat_status};
-use super::world::{flag, isocoat_response, response_from_c, response_to_c, unknown};
+use super::world::{check_reserved, flag, isocoat_response, response_from_c, response_to_c, unknown};
 use crate::world::{BodyDesc, StiffnessRule};
 
 /// What a body is made of: an ISOCOAT_BODY_ value.
@@ -126,6 +126,7 @@ impl From<&BodyDesc> for isocoat_body_desc {
 
 impl isocoat_body_desc {
     fn to_rust(self) -> Checked<BodyDesc> {
+        check_reserved(self.reserved)?;
         Ok(BodyDesc {
             rigid: match self.kind {
                 ISOCOAT_BODY_DEFORMABLE => false,

@@ -118,6 +118,7 @@ impl From<&WorldDesc> for isocoat_world_desc {
 
 impl isocoat_world_desc {
     fn to_rust(self) -> Checked<WorldDesc> {
+        check_reserved(self.reserved)?;
         Ok(WorldDesc {
             gravity: self.gravity.into(),
             response: response_from_c(self.response)?,
@@ -162,6 +163,11 @@ pub(super) fn flag(name: &str, value: u32) -> Checked<bool> {
         1 => Ok(true),
         other => Err(Refusal::argument(format!("{name} is {other}; must be 0 or 1"))),
     }
+}
+
+/// Refuses what a later version may give a meaning.
+pub(super) fn check_reserved(value: u32) -> Checked<()> {
+    if value == 0 { Ok(()) } else { Err(Refusal::argument(format!("reserved is {value}; must be 0"))) }
 }
 
 /// Refuses a value of an enum.
