@@ -304,7 +304,9 @@ mod tests {
             let mut sums = [0usize; 40];
             team.each_mut(&mut sums, 1, |outer, sum| {
                 let inner = AtomicUsize::new(0);
-                team.each(outer, 1, |range| drop(inner.fetch_add(range.len(), Ordering::Relaxed)));
+                team.each(outer, 1, |range| {
+                    inner.fetch_add(range.len(), Ordering::Relaxed);
+                });
                 *sum = inner.into_inner();
             });
             assert!(sums.iter().enumerate().all(|(outer, sum)| *sum == outer));
@@ -342,7 +344,9 @@ mod tests {
             Team::with(Some(&mut Odd(calls)), |team| {
                 assert_eq!(team.workers(), MOST_WORKERS);
                 let all = AtomicUsize::new(0);
-                team.each(10, 1, |range| drop(all.fetch_add(range.len(), Ordering::Relaxed)));
+                team.each(10, 1, |range| {
+                    all.fetch_add(range.len(), Ordering::Relaxed);
+                });
                 done += all.into_inner();
             });
             assert_eq!(done, 10);

@@ -241,7 +241,7 @@ fn settled(mut world: World, steps: usize) -> World {
 #[ignore = "measures time"]
 fn two_workers_are_nearly_twice_as_fast_on_125_bodies() {
     let mut slow = Vec::new();
-    let scenes: [(&str, fn() -> World, usize); 3] = [
+    let scenes: [Scene; 3] = [
         ("125 balls at rest in a heap", || settled(heap(5), 120), 100),
         ("125 balls that bounce", || bouncing(125), 100),
         ("120 cubes at rest in a wall", || settled(wall(15), 60), 60),

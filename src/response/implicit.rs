@@ -291,6 +291,7 @@ impl Solver {
     }
 
     /// Evaluates the contacts where the velocities lead.
+    #[expect(clippy::too_many_arguments, reason = "an island's step touches the whole state")]
     fn look(
         &mut self,
         motions: &[Motion],
