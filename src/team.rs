@@ -43,7 +43,7 @@ pub trait Tasks: Send {
 }
 
 /// Looks for work after which an idle helper lets other threads have its core.
-const PATIENCE: u32 = 1000;
+const PATIENCE: u32 = 10_000;
 
 /// Who works at a step.
 pub struct Team {
@@ -51,8 +51,9 @@ pub struct Team {
     main: ThreadId,
     /// A job is being done; what is asked for meanwhile, its asker does alone.
     busy: AtomicBool,
-    /// Number of the job in the upper half; how many of its blocks nobody has taken in the lower.
-    open: AtomicU64,
+    /// Number of the job in the upper half; the blocks that nobody has taken, from which one and up to which one, in
+    /// the quarters of the lower.
+    open: Line<AtomicU64>,
     /// The job: a closure and who can call it, how many places it has, and how many of them make a block. Changed only
     /// while no block is open or at work.
     closure: AtomicPtr<()>,
@@ -60,10 +61,18 @@ pub struct Team {
     count: AtomicUsize,
     block: AtomicUsize,
     /// Blocks of the job that are done.
-    done: AtomicUsize,
+    done: Line<AtomicUsize>,
     stopped: AtomicBool,
     panic: Mutex<Option<Box<dyn Any + Send>>>,
 }
+
+/// What many threads write to lies by itself, so that they do not take each other's neighbours away.
+#[derive(Default)]
+#[repr(align(128))]
+struct Line<T>(T);
+
+/// Most blocks of a job.
+const MOST_BLOCKS: usize = u16::MAX as usize;
 
 type Caller = unsafe fn(*const (), Range<usize>);
 
@@ -78,12 +87,12 @@ impl Team {
             helpers,
             main: std::thread::current().id(),
             busy: AtomicBool::new(false),
-            open: AtomicU64::new(0),
+            open: Line::default(),
             closure: AtomicPtr::default(),
             caller: AtomicPtr::default(),
             count: AtomicUsize::new(0),
             block: AtomicUsize::new(1),
-            done: AtomicUsize::new(0),
+            done: Line::default(),
             stopped: AtomicBool::new(false),
             panic: Mutex::new(None),
         }
@@ -122,7 +131,7 @@ impl Team {
         }
         let mut idle = 0;
         while !self.stopped.load(Ordering::Acquire) {
-            if self.take_block() {
+            if self.take_block(true) {
                 idle = 0;
             } else if idle < PATIENCE {
                 idle += 1;
@@ -131,6 +140,11 @@ impl Team {
                 std::thread::yield_now();
             }
         }
+    }
+
+    /// A size of blocks for `count` places of equal work, of at least `least`.
+    pub fn share(&self, count: usize, least: usize) -> usize {
+        count.div_ceil(2 * self.workers()).max(least)
     }
 
     /// Calls `work` with ranges that make up `0..count`, of `block` places but for the last.
@@ -143,6 +157,7 @@ impl Team {
             // SAFETY: `work` is the closure of this type that `each_of` has published; see `take_block`.
             unsafe { (*work.cast::<F>())(range) }
         }
+        let block = block.max(count.div_ceil(MOST_BLOCKS));
         let blocks = count.div_ceil(block);
         if blocks < 2 || self.helpers == 0 || self.busy.swap(true, Ordering::Relaxed) {
             if count > 0 {
@@ -150,16 +165,16 @@ impl Team {
             }
             return;
         }
-        self.done.store(0, Ordering::Relaxed);
+        self.done.0.store(0, Ordering::Relaxed);
         self.closure.store(std::ptr::from_ref(work).cast_mut().cast(), Ordering::Relaxed);
         self.caller.store(call::<F> as Caller as *mut (), Ordering::Relaxed);
         self.count.store(count, Ordering::Relaxed);
         self.block.store(block, Ordering::Relaxed);
-        let job = (self.open.load(Ordering::Relaxed) >> 32) + 1;
-        self.open.store(job << 32 | blocks as u64, Ordering::Release);
-        while self.take_block() {}
+        let job = (self.open.0.load(Ordering::Relaxed) >> 32) + 1;
+        self.open.0.store(job << 32 | blocks as u64, Ordering::Release);
+        while self.take_block(false) {}
         let mut waited = 0;
-        while self.done.load(Ordering::Acquire) < blocks {
+        while self.done.0.load(Ordering::Acquire) < blocks {
             waited += 1;
             if waited < PATIENCE { std::hint::spin_loop() } else { std::thread::yield_now() }
         }
@@ -170,19 +185,21 @@ impl Team {
         }
     }
 
-    /// Does one block. False when none is open.
-    fn take_block(&self) -> bool {
-        let open = self.open.load(Ordering::Acquire);
-        let left = (open & u64::from(u32::MAX)) as usize;
-        if left == 0 {
+    /// Does one block, from one end or the other: who always takes the same end finds its own work of the last job in its
+    /// cache. False when none is open.
+    fn take_block(&self, last: bool) -> bool {
+        let open = self.open.0.load(Ordering::Acquire);
+        let (low, high) = ((open >> 16 & 0xffff) as usize, (open & 0xffff) as usize);
+        if low == high {
             return false;
         }
+        let (index, rest) = if last { (high - 1, open - 1) } else { (low, open + (1 << 16)) };
         let (closure, caller) = (self.closure.load(Ordering::Relaxed), self.caller.load(Ordering::Relaxed));
         let (count, block) = (self.count.load(Ordering::Relaxed), self.block.load(Ordering::Relaxed));
-        if self.open.compare_exchange(open, open - 1, Ordering::Acquire, Ordering::Relaxed).is_err() {
+        if self.open.0.compare_exchange(open, rest, Ordering::Acquire, Ordering::Relaxed).is_err() {
             return true;
         }
-        let first = (left - 1) * block;
+        let first = index * block;
         // SAFETY: `caller` is a `Caller`: only `each_of` stores there, before the job is opened.
         let caller = unsafe { std::mem::transmute::<*mut (), Caller>(caller) };
         // SAFETY: the four belong to the job whose block was taken: `each_of` changes them only when all blocks of the
@@ -192,7 +209,7 @@ impl Team {
         if let Err(panic) = result {
             *self.panic.lock().unwrap_or_else(|poisoned| poisoned.into_inner()) = Some(panic);
         }
-        self.done.fetch_add(1, Ordering::Release);
+        self.done.0.fetch_add(1, Ordering::Release);
         true
     }
 
@@ -205,6 +222,26 @@ impl Team {
                 // nobody else has this item.
                 work(index, unsafe { &mut *all.at(index) });
             }
+        });
+    }
+
+    /// Calls `work` for each `size` items in a row, with the number of the row; what it gives goes to `results`.
+    pub fn each_row<T: Send, R: Send>(
+        &self,
+        items: &mut [T],
+        size: usize,
+        results: &mut [R],
+        work: impl Fn(usize, &mut [T]) -> R + Sync,
+    ) {
+        let count = items.len();
+        assert_eq!(results.len(), count.div_ceil(size), "a result for each row");
+        let all = Shared(items.as_mut_ptr());
+        self.each_mut(results, self.share(count.div_ceil(size), 1), |row, result| {
+            let (first, end) = (row * size, count.min((row + 1) * size));
+            // SAFETY: within the slice, which is borrowed until `each_mut` is done; rows do not overlap, and each goes
+            // with one result, so that nobody else has these items.
+            let items = unsafe { std::slice::from_raw_parts_mut(all.at(first), end - first) };
+            *result = work(row, items);
         });
     }
 
@@ -294,6 +331,20 @@ mod tests {
                         assert_eq!(items.iter().filter(|item| **item == u32::MAX).count(), places.len());
                     }
                 }
+            });
+        }
+    }
+
+    #[test]
+    fn rows_are_worked_at_whole_and_give_their_results_in_order() {
+        for workers in [1, 2, 5] {
+            Team::with(Some(&mut Threads(workers)), |team| {
+                let (mut items, mut sums) = ([1u32; 50], [0u32; 8]);
+                team.each_row(&mut items, 7, &mut sums, |row, items| {
+                    items.iter_mut().for_each(|item| *item += row as u32);
+                    items.iter().sum()
+                });
+                assert_eq!(sums, std::array::from_fn(|row| (row as u32 + 1) * if row == 7 { 1 } else { 7 }));
             });
         }
     }

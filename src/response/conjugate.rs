@@ -14,36 +14,37 @@ pub struct Blocks {
     diagonal: Vec<Matrix6<f64>>,
     /// Row, column below the diagonal, block.
     couplings: Vec<(u32, u32, Matrix6<f64>)>,
-    inverses: Vec<Matrix6<f64>>,
+    /// The couplings row by row, with those above the diagonal, and where each row's begin.
+    sources: Vec<Source>,
+    starts: Vec<u32>,
+    entries: Vec<Matrix6<f64>>,
     rows: Vec<Row>,
     direction: Vec<Vector6<f64>>,
-    /// The couplings row by row, with those above the diagonal, and where each row's begin.
-    entries: Vec<Entry>,
-    starts: Vec<u32>,
+    /// Sums over some rows each.
+    sums: Vec<f64>,
 }
 
 /// What the iteration keeps of a row of blocks.
 #[derive(Clone, Copy, Debug, Default)]
 struct Row {
+    inverse: Matrix6<f64>,
     x: Vector6<f64>,
     residual: Vector6<f64>,
     eased: Vector6<f64>,
     image: Vector6<f64>,
-    /// The row's part of a product.
-    part: f64,
 }
 
 /// A coupling as one of its two rows sees it.
 #[derive(Clone, Copy, Debug, Default)]
-struct Entry {
+struct Source {
     coupling: u32,
     other: u32,
     /// The row is the one of the transposed block.
     transposed: bool,
 }
 
-/// Rows that a worker takes in one go.
-const ROWS: usize = 16;
+/// Rows whose part of a sum is made by one worker: always as many, so that sums do not depend on who makes them.
+const ROWS: usize = 64;
 
 impl Blocks {
     /// All zero, for `count` blocks.
@@ -65,53 +66,71 @@ impl Blocks {
     /// Solves in place, to `tolerance` of the right side in the preconditioner's measure. False when a diagonal block
     /// is not positive definite.
     pub fn solve(&mut self, x: &mut [f64], tolerance: f64, most: usize, team: &Team) -> bool {
-        self.inverses.clear();
-        for block in &self.diagonal {
-            let Some(factor) = block.cholesky() else { return false };
-            self.inverses.push(factor.inverse());
-        }
-        self.list_entries();
-        let Self { diagonal, couplings, inverses, rows, direction, entries, starts } = self;
-        rows.clear();
-        rows.extend(x.chunks_exact(BLOCK).zip(inverses.iter()).map(|(x, inverse)| {
-            let residual = Vector6::from_column_slice(x);
-            let eased = inverse * residual;
-            Row { residual, eased, part: residual.dot(&eased), ..Row::default() }
-        }));
+        self.list_entries(team);
+        let Self { diagonal, sources, starts, entries, rows, direction, sums, .. } = self;
+        let count = diagonal.len();
+        rows.resize(count, Row::default());
         direction.clear();
-        direction.extend(rows.iter().map(|row| row.eased));
-        let sum = |rows: &[Row]| -> f64 { rows.iter().map(|row| row.part).sum() };
-        let mut size = sum(rows);
+        direction.resize(count, Vector6::zeros());
+        sums.resize(count.div_ceil(ROWS), 0.0);
+        // Each worker has the same rows in all that follows.
+        let block = ROWS * team.share(sums.len(), 1);
+        let right = &*x;
+        team.each_row(rows, ROWS, sums, |first, rows| {
+            let mut sum = 0.0;
+            for (index, row) in rows.iter_mut().enumerate() {
+                let index = first * ROWS + index;
+                let Some(factor) = diagonal[index].cholesky() else { return f64::NAN };
+                let residual = Vector6::from_column_slice(&right[index * BLOCK..][..BLOCK]);
+                let inverse = factor.inverse();
+                let eased = inverse * residual;
+                *row = Row { inverse, residual, eased, ..Row::default() };
+                sum += residual.dot(&eased);
+            }
+            sum
+        });
+        let mut size = sums.iter().sum::<f64>();
+        if size.is_nan() {
+            return false;
+        }
         let enough = tolerance * tolerance * size;
+        let mut turn = 0.0;
         for _ in 0..most {
             if size <= enough {
                 break;
             }
-            team.each_mut(rows, ROWS, |index, row| {
-                let mut image = diagonal[index] * direction[index];
-                for entry in &entries[starts[index] as usize..starts[index + 1] as usize] {
-                    let (block, other) = (&couplings[entry.coupling as usize].2, &direction[entry.other as usize]);
-                    image += if entry.transposed { block.tr_mul(other) } else { block * other };
+            team.each_mut(direction, block, |index, direction| *direction = rows[index].eased + *direction * turn);
+            team.each_row(rows, ROWS, sums, |first, rows| {
+                let mut sum = 0.0;
+                for (index, row) in rows.iter_mut().enumerate() {
+                    let index = first * ROWS + index;
+                    row.image = diagonal[index] * direction[index];
+                    let range = starts[index] as usize..starts[index + 1] as usize;
+                    for (entry, source) in entries[range.clone()].iter().zip(&sources[range]) {
+                        row.image += entry * direction[source.other as usize];
+                    }
+                    sum += direction[index].dot(&row.image);
                 }
-                (row.image, row.part) = (image, direction[index].dot(&image));
+                sum
             });
-            let bend = sum(rows);
+            let bend = sums.iter().sum::<f64>();
             if bend <= 0.0 {
                 break;
             }
             let part = size / bend;
-            team.each_mut(rows, ROWS, |index, row| {
-                row.x += direction[index] * part;
-                row.residual -= row.image * part;
-                row.eased = inverses[index] * row.residual;
-                row.part = row.residual.dot(&row.eased);
+            team.each_row(rows, ROWS, sums, |first, rows| {
+                let mut sum = 0.0;
+                for (index, row) in rows.iter_mut().enumerate() {
+                    row.x += direction[first * ROWS + index] * part;
+                    row.residual -= row.image * part;
+                    row.eased = row.inverse * row.residual;
+                    sum += row.residual.dot(&row.eased);
+                }
+                sum
             });
-            let next = sum(rows);
-            let turn = next / size;
+            let next = sums.iter().sum::<f64>();
+            turn = next / size;
             size = next;
-            for (direction, row) in direction.iter_mut().zip(rows.iter()) {
-                *direction = row.eased + *direction * turn;
-            }
         }
         for (x, row) in x.chunks_exact_mut(BLOCK).zip(rows.iter()) {
             x.copy_from_slice(row.x.as_slice());
@@ -120,8 +139,8 @@ impl Blocks {
     }
 
     /// Lists the couplings of each row, in the order in which they were added.
-    fn list_entries(&mut self) {
-        let Self { diagonal, couplings, entries, starts, .. } = self;
+    fn list_entries(&mut self, team: &Team) {
+        let Self { diagonal, couplings, sources, starts, entries, .. } = self;
         starts.clear();
         starts.resize(diagonal.len() + 2, 0);
         for (i, j, _) in couplings.iter() {
@@ -131,19 +150,25 @@ impl Blocks {
         for row in 2..starts.len() {
             starts[row] += starts[row - 1];
         }
-        entries.clear();
-        entries.resize(2 * couplings.len(), Entry::default());
+        sources.clear();
+        sources.resize(2 * couplings.len(), Source::default());
         // Filling moves each row's start, kept one place up meanwhile, to the next one's.
-        let mut list = |row: u32, entry: Entry| {
+        let mut list = |row: u32, source: Source| {
             let place = &mut starts[row as usize + 1];
-            entries[*place as usize] = entry;
+            sources[*place as usize] = source;
             *place += 1;
         };
         for (coupling, (i, j, _)) in couplings.iter().enumerate() {
             let coupling = coupling as u32;
-            list(*i, Entry { coupling, other: *j, transposed: false });
-            list(*j, Entry { coupling, other: *i, transposed: true });
+            list(*i, Source { coupling, other: *j, transposed: false });
+            list(*j, Source { coupling, other: *i, transposed: true });
         }
+        entries.resize(sources.len(), Matrix6::zeros());
+        team.each_mut(entries, team.share(sources.len(), 1), |index, entry| {
+            let Source { coupling, transposed, .. } = sources[index];
+            let block = &couplings[coupling as usize].2;
+            *entry = if transposed { block.transpose() } else { *block };
+        });
     }
 }
 

@@ -176,7 +176,7 @@ struct Part {
     blocks: [Matrix6<f64>; 3],
 }
 
-/// Groups that a worker takes in one go.
+/// Least groups that a worker takes in one go.
 const GROUPS: usize = 16;
 
 /// Steps of Newton's method in one solve.
@@ -399,7 +399,8 @@ impl Coupled {
         }
         let mut parts = std::mem::take(&mut self.parts);
         parts.resize_with(self.groups.len(), Part::default);
-        team.each_mut(&mut parts, GROUPS, |index, part| {
+        let block = team.share(parts.len(), GROUPS);
+        team.each_mut(&mut parts, block, |index, part| {
             self.work_out(&self.groups[index], x, fixed, h, with_matrix, part);
         });
         for (index, part) in parts.iter().enumerate() {

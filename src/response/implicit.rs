@@ -246,8 +246,11 @@ impl Solver {
         });
         for index in &island.candidates {
             let pair = &candidates[*index as usize].pair;
+            // Those that move are the island's, and there already.
             for link in pair.a.links.iter().chain(&pair.b.links) {
-                self.trial[*link as usize] = motions[*link as usize];
+                if !motions[*link as usize].is_movable() {
+                    self.trial[*link as usize] = motions[*link as usize];
+                }
             }
             for (i, j) in combinations(pair) {
                 let approach = deepest::approach(pair, i, j);
