@@ -251,6 +251,22 @@ fn whatever_the_host_changes_wakes() {
 }
 
 #[test]
+fn what_the_host_puts_beside_them_wakes_them_and_what_stood_there_does_not() {
+    let (mut world, _, ball) = one_asleep();
+    let post = Coat::ball(RADIUS);
+    let (_, post) = post.add_fixed(&mut world, Pose::at(1.0, 0.0, RADIUS));
+    for _ in 0..3 {
+        world.step(DT).unwrap();
+        assert_eq!(world.counters().asleep, 1);
+    }
+    let state = LinkState { pose: Pose::at(0.19, 0.0, RADIUS), twist: Twist::default() };
+    world.set_link_state(post, &state).unwrap();
+    world.step(DT).unwrap();
+    assert!(world.body_is_awake(ball.0).unwrap());
+    assert!(world.contacts().iter().any(|contact| contact.normal.x.abs() > 0.9));
+}
+
+#[test]
 fn without_their_support_they_fall_freely_at_once() {
     let (mut world, floor, ball) = one_asleep();
     let start = world.link_state(ball.1).unwrap().pose.position.z;

@@ -16,7 +16,7 @@ use crate::math::Twist;
 /// A body's sleep.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Sleep {
-    /// For how long it has been slow \[s\].
+    /// For how long it has been slow, and not been changed \[s\].
     pub quiet: f64,
     /// With whom it sleeps: the lowest slot of them, plus one; 0 when awake.
     pub group: u32,
@@ -80,7 +80,7 @@ impl World {
             let (mut woken, mut next) = (false, 0);
             for pair in &pairs {
                 let asleep = pair.map(|body| self.bodies[body as usize].is_asleep());
-                if asleep[0] == asleep[1] {
+                if asleep[0] == asleep[1] || self.is_still(pair[usize::from(asleep[0])], state) {
                     continue;
                 }
                 // Both lists are in order.
@@ -108,6 +108,17 @@ impl World {
         }
         state.pairs = pairs;
         *self.pair_filter.get_mut() = filter;
+    }
+
+    /// Whether a body that is awake does not move, and has not been changed since the last step: who sleeps near it has
+    /// its peace.
+    fn is_still(&self, body: u32, state: &Stepping) -> bool {
+        let body = &self.bodies[body as usize];
+        body.sleep.quiet > 0.0
+            && body.links.iter().all(|link| {
+                let motion = &state.motions[*link as usize];
+                !motion.is_movable() && motion.twist == Twist::default()
+            })
     }
 
     /// Pairs of which nobody sleeps any more go on as candidates of the last step.
