@@ -197,14 +197,22 @@ test-install: build
 comma := ,
 
 .PHONY: extremes
-extremes: ## all rows of the stability tables, into docs/extremes.md (takes long)
-	$(CARGO) test --release --test extremes -- --ignored --nocapture
+extremes: ## all rows of the stability tables, into docs/extremes.md, and a pyramid for a minute (takes long)
+	$(CARGO) test --release --test extremes --test stacks -- --ignored --nocapture
 	@if $(PKG_CONFIG) --exists bullet-float64 2>/dev/null; then \
 		$(MAKE) $(WORK)/tests/cpp/bullet_extremes-double && \
 		$(WORK)/tests/cpp/bullet_extremes-double table | tee -a docs/extremes.md; \
 	else \
 		echo 'No rows under Bullet: libbullet-dev is missing.'; \
 	fi
+
+.PHONY: count
+count: ## what a scene pays for what it uses: bytes a body, instructions a step (needs valgrind)
+	$(CARGO) test --release --test count -- --ignored --nocapture
+
+.PHONY: workers
+workers: ## how much faster two workers are (needs two idle cores)
+	$(CARGO) test --release --test workers -- --ignored --nocapture
 
 .PHONY: bench
 bench: ## measure

@@ -5,7 +5,8 @@
 //!
 //! The layers, each importing only from those above it in this list:
 //!
-//! - [`math`], [`error`], [`handle`]: vectors and poses, one error enum, ids of objects;
+//! - [`math`], [`error`], [`handle`], [`team`], [`clock`]: vectors and poses, one error enum, ids of objects, work side
+//!   by side;
 //! - [`field`]: what skeletons emit, and how it adds up;
 //! - [`base`]: the links that carry skeletons;
 //! - [`coat`]: the implicit layer of one body: seeds and territories;
@@ -17,6 +18,7 @@
 
 pub mod base;
 pub mod capi;
+pub mod clock;
 pub mod coat;
 pub mod contact;
 pub mod error;
@@ -25,7 +27,9 @@ pub mod handle;
 pub mod math;
 pub mod response;
 pub mod surface;
+pub mod team;
 pub mod world;
 
 pub use error::{Error, Result};
+pub use team::Tasks;
 pub use world::World;

@@ -5,6 +5,7 @@ mod common;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
+use common::pool::Pool;
 use common::{Coat, ball_inertia, box_inertia};
 use isocoat::base::Kind;
 use isocoat::field::Shape;
@@ -122,6 +123,18 @@ fn a_step_of_a_mixed_resting_scene_allocates_nothing() {
         count
     });
     assert_eq!(counts, [0; 4]);
+}
+
+/// Also where threads of the host help, as far as the thread that steps is concerned, and where all sleep.
+#[test]
+fn steps_with_helpers_and_steps_of_sleepers_allocate_nothing() {
+    let mut helped = resting_scene(Scheme::Auto, false);
+    helped.set_tasks(Some(Box::new(Pool::new(2))));
+    assert_eq!(allocations(helped, 9), 0);
+    let mut asleep = resting_scene(Scheme::Auto, true);
+    let desc = WorldDesc { sleep_time: 0.1, sleep_speed: 1.0, ..asleep.desc().clone() };
+    asleep.set_desc(desc).unwrap();
+    assert_eq!(allocations(asleep, 4), 0);
 }
 
 #[test]

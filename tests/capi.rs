@@ -144,11 +144,12 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
         buffer::isocoat_buffer { data, stride, format }
         world::isocoat_world_desc {
             struct_size, response, scheme, seed_count, max_substeps, gravity, force_tolerance, substep_phase, implicit_tolerance,
-            implicit_rounds, implicit_splits,
+            implicit_rounds, implicit_splits, sleep_time, sleep_speed, timed, reserved,
         }
         body::isocoat_body_desc {
             struct_size, kind, isovalue, stiffness_scale, friction, static_friction, viscous_friction, dissipation,
             category, mask, user_data, response, stiffness_rule, static_sink, contact_frequency, damping_ratio,
+            may_sleep, reserved,
         }
         link::isocoat_link_desc {
             struct_size, kind, pose, linear_velocity, angular_velocity, mass, local_center_of_mass, inertia,
@@ -165,7 +166,10 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
         report::isocoat_event { kind, reserved, body_a, body_b }
         report::isocoat_counters {
             struct_size, bodies, links, skeletons, pairs, islands, substeps, patches, evaluations,
-            implicit_rounds, implicit_splits,
+            implicit_rounds, implicit_splits, evaluations_by_scheme, patches_by_scheme, asleep, reserved,
+        }
+        report::isocoat_times {
+            struct_size, reserved, step, begin, pairs, islands, respond, contact, solve, report,
         }
         query::isocoat_ray_hit { body, link, skeleton, distance, position, normal }
         query::isocoat_surface_point { position, normal, distance, link, skeleton }

@@ -21,6 +21,7 @@ const SECTIONS: &[(&str, &str)] = &[
     ("motion", "Motion of one link"),
     ("buffer", "Bulk calls"),
     ("bulk", ""),
+    ("tasks", "Threads of the host"),
     ("report", "What a step reports"),
     ("snapshot", "Snapshots"),
     ("query", "Queries"),

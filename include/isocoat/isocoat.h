@@ -300,6 +300,19 @@ typedef struct isocoat_world_desc {
     uint32_t implicit_rounds;
     /** Implicit response: how often a step that does not converge may be split in two: from 0 to 10. Default 4. */
     uint32_t implicit_splits;
+    /**
+     * Time for which a group of bodies must be at rest before it falls asleep, in s: at least 0; 0 is never. Default 0.
+     */
+    double sleep_time;
+    /**
+     * Speed up to which a body counts as at rest, in thicknesses of its thinnest coat a second: from 0 to 1e6.
+     * Default 0.01.
+     */
+    double sleep_speed;
+    /** 1 for steps that read the clock for isocoat_world_get_times(), else 0. Default 0. */
+    uint32_t timed;
+    /** 0. */
+    uint32_t reserved;
 } isocoat_world_desc;
 
 /** How much a message matters: an ISOCOAT_LOG_ value. More may come. */
@@ -507,6 +520,10 @@ typedef struct isocoat_body_desc {
      * With ISOCOAT_STIFFNESS_FREQUENCY: damping over the critical one, from 0 to 10; replaces dissipation. Default 0.
      */
     double damping_ratio;
+    /** 1 if it may fall asleep where the world lets bodies sleep, else 0. Default 1. */
+    uint32_t may_sleep;
+    /** 0. */
+    uint32_t reserved;
 } isocoat_body_desc;
 
 /**
@@ -608,6 +625,28 @@ ISOCOAT_MUST_USE isocoat_status isocoat_body_set_enabled(isocoat_world *world, i
  * Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
  */
 ISOCOAT_MUST_USE isocoat_status isocoat_body_is_enabled(const isocoat_world *world, isocoat_body body, bool *enabled);
+
+/**
+ * Whether a body is awake; those that cannot move always are. See isocoat_world_desc::sleep_time.
+ *
+ * - world: not NULL.
+ * - body: the body.
+ * - awake: receives the answer; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
+ */
+ISOCOAT_MUST_USE isocoat_status isocoat_body_is_awake(const isocoat_world *world, isocoat_body body, bool *awake);
+
+/**
+ * Wakes a body with all that sleep with it; of one that cannot move, those that lean on it. Touch, and whatever the
+ * host changes about a body, wake it by themselves.
+ *
+ * - world: not NULL.
+ * - body: the body.
+ *
+ * Errors: INVALID_HANDLE. Threads: changes the world.
+ */
+ISOCOAT_MUST_USE isocoat_status isocoat_body_wake(isocoat_world *world, isocoat_body body);
 
 /**
  * The host's own pointer of a body.
@@ -1299,7 +1338,86 @@ isocoat_status isocoat_world_get_link_impulses(const isocoat_world *world,
                                                isocoat_buffer linear,
                                                isocoat_buffer angular);
 
+/* ---- Threads of the host ----------------------------------------------------------------------------------------- */
+
+/**
+ * Work of a step, for a thread of the host: to be called once, with the pointer that came along. It returns when the
+ * step has no more to do.
+ *
+ * - task: as given to isocoat_enqueue_task_fn.
+ */
+typedef void (*isocoat_task_fn)(void *task);
+
+/**
+ * Hands a task to the host's threads; called in a step, on the thread that steps, up to worker_count - 1 times before
+ * the work begins.
+ *
+ * - context: as given to isocoat_world_set_tasks.
+ * - run, task: what a thread of the host is to call, run(task), as soon as it can. A call on the thread that steps is
+ *   wasted: it returns at once.
+ *
+ * Returns what isocoat_finish_task_fn needs to know it by; NULL refuses it, and the step does without. It must return
+ * (no longjmp, no exception); calls on the world from here give ISOCOAT_ERROR_LOCKED.
+ */
+typedef void *(*isocoat_enqueue_task_fn)(void *context, isocoat_task_fn run, void *task);
+
+/**
+ * Waits for a task; called in a step, on the thread that steps, once for each that was taken.
+ *
+ * - context: as given to isocoat_world_set_tasks.
+ * - handle: what isocoat_enqueue_task_fn returned for it.
+ *
+ * It must return, when the task has returned or will never be run any more.
+ */
+typedef void (*isocoat_finish_task_fn)(void *context, void *handle);
+
+/**
+ * Sets whose threads help with the steps of a world. Without, a step is the work of the thread that calls it; the
+ * library starts no threads. Results are the same bits for any number of workers, and whatever the host's threads do.
+ *
+ * - world: not NULL.
+ * - worker_count: how many may work at once, the thread that steps included: from 1 to 64. Helpers keep their threads
+ *   busy for the whole step: not more than there are cores.
+ * - enqueue, finish: the functions; both NULL for none.
+ * - context: given to them, otherwise unused; may be NULL. It must outlive the world or the next set.
+ *
+ * Errors: OUT_OF_RANGE, INVALID_ARGUMENT. Threads: changes the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_world_set_tasks(isocoat_world *world,
+                                       uint32_t worker_count,
+                                       isocoat_enqueue_task_fn enqueue,
+                                       isocoat_finish_task_fn finish,
+                                       void *context);
+
 /* ---- What a step reports ----------------------------------------------------------------------------------------- */
+
+/**
+ * Where the time of the last step went, in s; zero unless isocoat_world_desc::timed asked for it. Begin with
+ * isocoat_times_default().
+ */
+typedef struct isocoat_times {
+    /** Size of this struct in bytes, as the host knows it. */
+    uint32_t struct_size;
+    /** 0. */
+    uint32_t reserved;
+    /** The whole step. */
+    double step;
+    /** Taking over states, forces and impulses. */
+    double begin;
+    /** Broad phase: pairs whose bounds meet, with the filter; what of their coats can matter. */
+    double pairs;
+    /** Groups of bodies that are stepped together. */
+    double islands;
+    /** Forces and motion. */
+    double respond;
+    /** Of that, contact surfaces; added up over workers where groups are stepped side by side. */
+    double contact;
+    /** Of that, what follows from the surfaces: systems, velocities, friction; added up likewise. */
+    double solve;
+    /** Handing back poses and impulses, contacts and events; falling asleep. */
+    double report;
+} isocoat_times;
 
 /** Figures of the last step. Begin with isocoat_counters_default(). */
 typedef struct isocoat_counters {
@@ -1325,6 +1443,17 @@ typedef struct isocoat_counters {
     uint32_t implicit_rounds;
     /** Splits of the implicitly solved group that took the most. */
     uint32_t implicit_splits;
+    /**
+     * Evaluations of a pair of fields by each scheme, at its ISOCOAT_SCHEME_ value; at ISOCOAT_SCHEME_AUTO those of
+     * searches that found no patch. The rest is 0.
+     */
+    uint64_t evaluations_by_scheme[8];
+    /** Pieces of contact surface that each scheme integrated, in all rounds and sub-steps; likewise. */
+    uint64_t patches_by_scheme[8];
+    /** Bodies asleep. */
+    uint32_t asleep;
+    /** 0. */
+    uint32_t reserved;
 } isocoat_counters;
 
 /** One connected piece of contact surface between two coats. */
@@ -1390,6 +1519,26 @@ typedef struct isocoat_event {
 } isocoat_event;
 
 /**
+ * Fills times with zeros and their size; isocoat_times_default() calls it.
+ *
+ * - times: receives at most size bytes, its struct_size among them; not NULL.
+ * - size: sizeof(isocoat_times) as the host was compiled.
+ *
+ * Errors: INVALID_ARGUMENT. Threads: any.
+ */
+isocoat_status isocoat_times_init(isocoat_times *times, size_t size);
+
+/**
+ * Where the time of the last step went.
+ *
+ * - world: not NULL.
+ * - times: receives it; not NULL, with struct_size set.
+ *
+ * Errors: INVALID_ARGUMENT. Threads: reads the world.
+ */
+ISOCOAT_MUST_USE isocoat_status isocoat_world_get_times(const isocoat_world *world, isocoat_times *times);
+
+/**
  * Fills counters with zeros and their size; isocoat_counters_default() calls it.
  *
  * - counters: receives at most size bytes, its struct_size among them; not NULL.
@@ -1400,7 +1549,8 @@ typedef struct isocoat_event {
 isocoat_status isocoat_counters_init(isocoat_counters *counters, size_t size);
 
 /**
- * The contacts of the last step; of a sub-stepped one, as they were in its last sub-step.
+ * The contacts of the last step; of a sub-stepped one, as they were in its last sub-step; of bodies asleep, as they
+ * were when these fell asleep. The last come first.
  *
  * - world: not NULL.
  * - contacts: receives a pointer to them (not to be freed); not NULL.
@@ -1463,8 +1613,8 @@ isocoat_status isocoat_world_snapshot(const isocoat_world *world,
                                       size_t *size);
 
 /**
- * Puts a world back to what a snapshot says. Log and pair filter stay; contacts, events and the figures of the last
- * step are empty until the next step.
+ * Puts a world back to what a snapshot says. Log, pair filter and tasks stay; until the next step there are no events,
+ * no figures, and no contacts but those of bodies asleep.
  *
  * - world: not NULL.
  * - buffer: the snapshot; not NULL.
@@ -1757,6 +1907,13 @@ static inline isocoat_counters isocoat_counters_default(void)
     return counters;
 }
 
+static inline isocoat_times isocoat_times_default(void)
+{
+    isocoat_times times;
+    isocoat_times_init(&times, sizeof times);
+    return times;
+}
+
 static inline isocoat_debug_draw isocoat_debug_draw_default(void)
 {
     isocoat_debug_draw draw;
@@ -1786,6 +1943,7 @@ ISOCOAT_MUST_USE static inline isocoat_status isocoat_check_abi(void)
         (uint32_t)sizeof(isocoat_ray_hit),
         (uint32_t)sizeof(isocoat_surface_point),
         (uint32_t)sizeof(isocoat_debug_draw),
+        (uint32_t)sizeof(isocoat_times),
     };
     return isocoat_check_abi_of(ISOCOAT_VERSION, sizes, sizeof sizes / sizeof sizes[0]);
 }

@@ -42,6 +42,7 @@ using link_state = isocoat_link_state;
 using contact = isocoat_contact;
 using event = isocoat_event;
 using counters = isocoat_counters;
+using times = isocoat_times;
 using ray_hit = isocoat_ray_hit;
 using surface_point = isocoat_surface_point;
 
@@ -269,6 +270,8 @@ public:
     void set_desc(const isocoat_body_desc &desc) { check(isocoat_body_set_desc(world_, raw_, &desc)); }
     bool is_enabled() const { return detail::read(false, isocoat_body_is_enabled, world_, raw_); }
     void set_enabled(bool enabled) { check(isocoat_body_set_enabled(world_, raw_, enabled)); }
+    bool is_awake() const { return detail::read(false, isocoat_body_is_awake, world_, raw_); }
+    void wake() { check(isocoat_body_wake(world_, raw_)); }
     void *user_data() const { return detail::read<void *>(nullptr, isocoat_body_get_user_data, world_, raw_); }
     link create_link(const isocoat_link_desc &desc)
     {
@@ -323,6 +326,8 @@ class world {
 public:
     using log_function = std::function<void(isocoat_log_level, const char *)>;
     using pair_filter = std::function<bool(isocoat_body, isocoat_body)>;
+    using enqueue_function = std::function<void *(isocoat_task_fn run, void *task)>;
+    using finish_function = std::function<void(void *handle)>;
     using line_function = std::function<void(const double *a, const double *b, std::uint32_t color)>;
     using point_function = std::function<void(const double *position, double size, std::uint32_t color)>;
 
@@ -402,6 +407,7 @@ public:
     {
         return detail::read(isocoat_counters_default(), isocoat_world_get_counters, get());
     }
+    isocoat::times times() const { return detail::read(isocoat_times_default(), isocoat_world_get_times, get()); }
 
     /* An empty function takes the callback away. Calls on this world from a callback throw ISOCOAT_ERROR_LOCKED. */
     void set_log(log_function log)
@@ -415,6 +421,17 @@ public:
         callbacks &all = keep_callbacks();
         check(isocoat_world_set_pair_filter(get(), filter ? &callbacks::call_filter : nullptr, &all));
         all.filter = std::move(filter);
+    }
+
+    /* Threads that help with the steps: enqueue hands run(task) to one of them and returns what finish waits by, or
+     * nullptr. What enqueue throws counts as a refusal; finish must not throw before it has waited. */
+    void set_tasks(std::uint32_t worker_count, enqueue_function enqueue, finish_function finish)
+    {
+        callbacks &all = keep_callbacks();
+        check(isocoat_world_set_tasks(get(), worker_count, enqueue ? &callbacks::call_enqueue : nullptr,
+                                      finish ? &callbacks::call_finish : nullptr, &all));
+        all.enqueue = std::move(enqueue);
+        all.finish = std::move(finish);
     }
 
     /* Bulk calls; links are raw handles, as link::raw() gives them. */
@@ -479,6 +496,8 @@ private:
     struct callbacks {
         log_function log;
         pair_filter filter;
+        enqueue_function enqueue;
+        finish_function finish;
         std::exception_ptr thrown;
 
         static void call_log(void *context, isocoat_log_level level, const char *message)
@@ -498,6 +517,25 @@ private:
             } catch (...) {
                 self.thrown = std::current_exception();
                 return false;
+            }
+        }
+        static void *call_enqueue(void *context, isocoat_task_fn run, void *task)
+        {
+            callbacks &self = *static_cast<callbacks *>(context);
+            try {
+                return self.enqueue(run, task);
+            } catch (...) {
+                self.thrown = std::current_exception();
+                return nullptr;
+            }
+        }
+        static void call_finish(void *context, void *handle)
+        {
+            callbacks &self = *static_cast<callbacks *>(context);
+            try {
+                self.finish(handle);
+            } catch (...) {
+                self.thrown = std::current_exception();
             }
         }
         void rethrow()

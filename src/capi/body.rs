@@ -9,7 +9,7 @@ use super::guard::{free, isocoat_world, read, write};
 use super::handle::{isocoat_body, isocoat_link};
 use super::pointer::{List, Out};
 use super::status::{Checked, isocoat_status};
-use super::world::{isocoat_response, response_from_c, response_to_c, unknown};
+use super::world::{check_reserved, flag, isocoat_response, response_from_c, response_to_c, unknown};
 use crate::world::{BodyDesc, StiffnessRule};
 
 /// What a body is made of: an ISOCOAT_BODY_ value.
@@ -71,6 +71,10 @@ pub struct isocoat_body_desc {
     pub contact_frequency: f64,
     /// With ISOCOAT_STIFFNESS_FREQUENCY: damping over the critical one, from 0 to 10; replaces dissipation. Default 0.
     pub damping_ratio: f64,
+    /// 1 if it may fall asleep where the world lets bodies sleep, else 0. Default 1.
+    pub may_sleep: u32,
+    /// 0.
+    pub reserved: u32,
 }
 
 // SAFETY: `repr(C)`, the size first, numbers and a pointer that is never followed.
@@ -114,12 +118,15 @@ impl From<&BodyDesc> for isocoat_body_desc {
             static_sink,
             contact_frequency,
             damping_ratio,
+            may_sleep: desc.may_sleep.into(),
+            reserved: 0,
         }
     }
 }
 
 impl isocoat_body_desc {
     fn to_rust(self) -> Checked<BodyDesc> {
+        check_reserved(self.reserved)?;
         Ok(BodyDesc {
             rigid: match self.kind {
                 ISOCOAT_BODY_DEFORMABLE => false,
@@ -144,6 +151,7 @@ impl isocoat_body_desc {
             mask: self.mask,
             user_data: self.user_data as usize,
             response: response_from_c(self.response)?,
+            may_sleep: flag("may_sleep", self.may_sleep)?,
         })
     }
 }
@@ -313,6 +321,44 @@ pub unsafe extern "C" fn isocoat_body_is_enabled(
             Ok(())
         })
     }
+}
+
+/// Whether a body is awake; those that cannot move always are. See isocoat_world_desc::sleep_time.
+///
+/// - world: not NULL.
+/// - body: the body.
+/// - awake: receives the answer; not NULL.
+///
+/// Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
+#[must_use]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn isocoat_body_is_awake(
+    world: *const isocoat_world,
+    body: isocoat_body,
+    awake: *mut bool,
+) -> isocoat_status {
+    // SAFETY: the pointers are NULL or as their lines say.
+    unsafe {
+        read(world, |inner| {
+            let out = Out::new(awake, "awake")?;
+            out.put(inner.world.body_is_awake(body.into())?);
+            Ok(())
+        })
+    }
+}
+
+/// Wakes a body with all that sleep with it; of one that cannot move, those that lean on it. Touch, and whatever the
+/// host changes about a body, wake it by themselves.
+///
+/// - world: not NULL.
+/// - body: the body.
+///
+/// Errors: INVALID_HANDLE. Threads: changes the world.
+#[must_use]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn isocoat_body_wake(world: *mut isocoat_world, body: isocoat_body) -> isocoat_status {
+    // SAFETY: NULL or a live world.
+    unsafe { write(world, |inner| Ok(inner.world.wake_body(body.into())?)) }
 }
 
 /// The host's own pointer of a body.

@@ -185,6 +185,12 @@ fn catch<T>(call: impl FnOnce() -> T) -> Result<T, String> {
     })
 }
 
+/// Runs work of the library on a thread that the host lends: its panics are kept for the step, and not printed.
+pub(super) fn inside<T>(work: impl FnOnce() -> T) -> T {
+    let _inside = Guarded::set(true);
+    work()
+}
+
 /// Runs a callback of the host: its own panics, if it is Rust too, are none of the library's business.
 pub(super) fn outside<T>(callback: impl FnOnce() -> T) -> T {
     let _outside = Guarded::set(false);

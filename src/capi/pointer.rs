@@ -1,5 +1,7 @@
 //! Memory of the host: NULL checks that name the parameter, and access that asks nothing of alignment.
 
+use libc::c_void;
+
 use super::status::{Checked, ISOCOAT_ERROR_BUFFER_TOO_SMALL, Refusal};
 use crate::math::Vec3;
 
@@ -211,5 +213,19 @@ impl Count {
             return Err(Refusal::new(ISOCOAT_ERROR_BUFFER_TOO_SMALL, message));
         }
         Ok(())
+    }
+}
+
+/// A pointer of the host that goes back to the host only.
+#[derive(Clone, Copy)]
+pub(super) struct Context(pub *mut c_void);
+
+// SAFETY: never dereferenced here; the host is told on which threads its callbacks run.
+unsafe impl Send for Context {}
+
+impl Context {
+    /// A method, so that closures capture the whole and stay `Send`.
+    pub fn pointer(self) -> *mut c_void {
+        self.0
     }
 }

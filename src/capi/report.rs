@@ -10,7 +10,7 @@ use super::handle::{isocoat_body, isocoat_link, isocoat_skeleton};
 use super::pointer::Out;
 use super::status::isocoat_status;
 use super::world::{isocoat_scheme, scheme_to_c};
-use crate::world::{Contact, Counters, Event, EventKind, World};
+use crate::world::{Contact, Counters, Event, EventKind, Times, World};
 
 /// One connected piece of contact surface between two coats.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -122,12 +122,17 @@ impl From<&Event> for isocoat_event {
 pub(super) struct Views {
     contacts: Vec<isocoat_contact>,
     events: Vec<isocoat_event>,
+    /// The revision of the contacts at rest that are at the front.
+    resting: u64,
 }
 
 impl Views {
     pub fn refresh(&mut self, world: &World) {
-        self.contacts.clear();
-        self.contacts.extend(world.contacts().iter().map(isocoat_contact::from));
+        // Contacts at rest stay where they are.
+        let (resting, revision) = world.resting_contacts();
+        let kept = if std::mem::replace(&mut self.resting, revision) == revision { resting } else { 0 };
+        self.contacts.truncate(kept);
+        self.contacts.extend(world.contacts()[kept..].iter().map(isocoat_contact::from));
         self.events.clear();
         self.events.extend(world.events().iter().map(isocoat_event::from));
     }
@@ -159,6 +164,15 @@ pub struct isocoat_counters {
     pub implicit_rounds: u32,
     /// Splits of the implicitly solved group that took the most.
     pub implicit_splits: u32,
+    /// Evaluations of a pair of fields by each scheme, at its ISOCOAT_SCHEME_ value; at ISOCOAT_SCHEME_AUTO those of
+    /// searches that found no patch. The rest is 0.
+    pub evaluations_by_scheme: [u64; 8],
+    /// Pieces of contact surface that each scheme integrated, in all rounds and sub-steps; likewise.
+    pub patches_by_scheme: [u64; 8],
+    /// Bodies asleep.
+    pub asleep: u32,
+    /// 0.
+    pub reserved: u32,
 }
 
 // SAFETY: `repr(C)`, the size first, integers only.
@@ -185,7 +199,93 @@ impl From<Counters> for isocoat_counters {
             evaluations: counters.evaluations,
             implicit_rounds: counters.implicit_rounds,
             implicit_splits: counters.implicit_splits,
+            evaluations_by_scheme: by_scheme(&counters.by_scheme.evaluations),
+            patches_by_scheme: by_scheme(&counters.by_scheme.patches),
+            asleep: counters.asleep,
+            reserved: 0,
         }
+    }
+}
+
+fn by_scheme(counts: &[u64]) -> [u64; 8] {
+    std::array::from_fn(|scheme| counts.get(scheme).copied().unwrap_or(0))
+}
+
+/// Where the time of the last step went, in s; zero unless isocoat_world_desc::timed asked for it. Begin with
+/// isocoat_times_default().
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub struct isocoat_times {
+    /// Size of this struct in bytes, as the host knows it.
+    pub struct_size: u32,
+    /// 0.
+    pub reserved: u32,
+    /// The whole step.
+    pub step: f64,
+    /// Taking over states, forces and impulses.
+    pub begin: f64,
+    /// Broad phase: pairs whose bounds meet, with the filter; what of their coats can matter.
+    pub pairs: f64,
+    /// Groups of bodies that are stepped together.
+    pub islands: f64,
+    /// Forces and motion.
+    pub respond: f64,
+    /// Of that, contact surfaces; added up over workers where groups are stepped side by side.
+    pub contact: f64,
+    /// Of that, what follows from the surfaces: systems, velocities, friction; added up likewise.
+    pub solve: f64,
+    /// Handing back poses and impulses, contacts and events; falling asleep.
+    pub report: f64,
+}
+
+// SAFETY: `repr(C)`, the size first, integers and doubles only.
+unsafe impl Descriptor for isocoat_times {
+    const NAME: &'static str = "isocoat_times";
+    const FIRST_SIZE: usize = offset_of!(Self, report) + size_of::<f64>();
+
+    fn defaults() -> Self {
+        Self::from(Times::default())
+    }
+}
+
+impl From<Times> for isocoat_times {
+    fn from(times: Times) -> Self {
+        let Times { step, begin, pairs, islands, respond, contact, solve, report } = times;
+        Self { struct_size: 0, reserved: 0, step, begin, pairs, islands, respond, contact, solve, report }
+    }
+}
+
+/// Fills times with zeros and their size; isocoat_times_default() calls it.
+///
+/// - times: receives at most size bytes, its struct_size among them; not NULL.
+/// - size: sizeof(isocoat_times) as the host was compiled.
+///
+/// Errors: INVALID_ARGUMENT. Threads: any.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn isocoat_times_init(times: *mut isocoat_times, size: size_t) -> isocoat_status {
+    // SAFETY: the host gives `size` bytes.
+    free(|| unsafe { descriptor::init(times, size, "times") })
+}
+
+/// Where the time of the last step went.
+///
+/// - world: not NULL.
+/// - times: receives it; not NULL, with struct_size set.
+///
+/// Errors: INVALID_ARGUMENT. Threads: reads the world.
+#[must_use]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn isocoat_world_get_times(
+    world: *const isocoat_world,
+    times: *mut isocoat_times,
+) -> isocoat_status {
+    // SAFETY: the pointers are NULL or as their lines say.
+    unsafe {
+        read(world, |inner| {
+            let out = OutStruct::new(times, "times")?;
+            out.put(&inner.world.times().into());
+            Ok(())
+        })
     }
 }
 
@@ -201,7 +301,8 @@ pub unsafe extern "C" fn isocoat_counters_init(counters: *mut isocoat_counters, 
     free(|| unsafe { descriptor::init(counters, size, "counters") })
 }
 
-/// The contacts of the last step; of a sub-stepped one, as they were in its last sub-step.
+/// The contacts of the last step; of a sub-stepped one, as they were in its last sub-step; of bodies asleep, as they
+/// were when these fell asleep. The last come first.
 ///
 /// - world: not NULL.
 /// - contacts: receives a pointer to them (not to be freed); not NULL.

@@ -37,8 +37,8 @@ pub unsafe extern "C" fn isocoat_world_snapshot(
     }
 }
 
-/// Puts a world back to what a snapshot says. Log and pair filter stay; contacts, events and the figures of the last
-/// step are empty until the next step.
+/// Puts a world back to what a snapshot says. Log, pair filter and tasks stay; until the next step there are no events,
+/// no figures, and no contacts but those of bodies asleep.
 ///
 /// - world: not NULL.
 /// - buffer: the snapshot; not NULL.

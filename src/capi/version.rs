@@ -73,6 +73,7 @@ const LAYOUTS: &[Layout] = &[
     fixed::<super::query::isocoat_ray_hit>("isocoat_ray_hit"),
     fixed::<super::query::isocoat_surface_point>("isocoat_surface_point"),
     growable::<super::draw::isocoat_debug_draw>(),
+    growable::<super::report::isocoat_times>(),
 ];
 
 /// What isocoat_check_abi calls: compares a host's version and struct sizes with the library's.

@@ -7,7 +7,7 @@ use libc::{c_char, c_void, size_t};
 use super::descriptor::{self, Descriptor, OutStruct};
 use super::guard::{self, free, isocoat_world, outside, read, write};
 use super::handle::isocoat_body;
-use super::pointer::{List, Out};
+use super::pointer::{Context, List, Out};
 use super::status::{Checked, Refusal, isocoat_status};
 use crate::world::{BodyId, LogLevel, Response, Scheme, World, WorldDesc};
 
@@ -73,6 +73,15 @@ pub struct isocoat_world_desc {
     pub implicit_rounds: u32,
     /// Implicit response: how often a step that does not converge may be split in two: from 0 to 10. Default 4.
     pub implicit_splits: u32,
+    /// Time for which a group of bodies must be at rest before it falls asleep, in s: at least 0; 0 is never. Default 0.
+    pub sleep_time: f64,
+    /// Speed up to which a body counts as at rest, in thicknesses of its thinnest coat a second: from 0 to 1e6.
+    /// Default 0.01.
+    pub sleep_speed: f64,
+    /// 1 for steps that read the clock for isocoat_world_get_times(), else 0. Default 0.
+    pub timed: u32,
+    /// 0.
+    pub reserved: u32,
 }
 
 // SAFETY: `repr(C)`, the size first, integers and doubles only.
@@ -99,12 +108,17 @@ impl From<&WorldDesc> for isocoat_world_desc {
             implicit_tolerance: desc.implicit_tolerance,
             implicit_rounds: desc.implicit_rounds,
             implicit_splits: desc.implicit_splits,
+            sleep_time: desc.sleep_time,
+            sleep_speed: desc.sleep_speed,
+            timed: desc.timed.into(),
+            reserved: 0,
         }
     }
 }
 
 impl isocoat_world_desc {
     fn to_rust(self) -> Checked<WorldDesc> {
+        check_reserved(self.reserved)?;
         Ok(WorldDesc {
             gravity: self.gravity.into(),
             response: response_from_c(self.response)?,
@@ -116,6 +130,9 @@ impl isocoat_world_desc {
             implicit_tolerance: self.implicit_tolerance,
             implicit_rounds: self.implicit_rounds,
             implicit_splits: self.implicit_splits,
+            sleep_time: self.sleep_time,
+            sleep_speed: self.sleep_speed,
+            timed: flag("timed", self.timed)?,
         })
     }
 }
@@ -137,6 +154,20 @@ pub(super) fn response_from_c(value: isocoat_response) -> Checked<Response> {
         ISOCOAT_RESPONSE_SUBSTEPPED => Response::Substepped,
         other => return Err(unknown("response", other, "ISOCOAT_RESPONSE_", 3)),
     })
+}
+
+/// A number that says yes or no.
+pub(super) fn flag(name: &str, value: u32) -> Checked<bool> {
+    match value {
+        0 => Ok(false),
+        1 => Ok(true),
+        other => Err(Refusal::argument(format!("{name} is {other}; must be 0 or 1"))),
+    }
+}
+
+/// Refuses what a later version may give a meaning.
+pub(super) fn check_reserved(value: u32) -> Checked<()> {
+    if value == 0 { Ok(()) } else { Err(Refusal::argument(format!("reserved is {value}; must be 0"))) }
 }
 
 /// Refuses a value of an enum.
@@ -313,20 +344,6 @@ pub type isocoat_log_fn =
 /// here give ISOCOAT_ERROR_LOCKED.
 pub type isocoat_pair_filter_fn =
     Option<unsafe extern "C" fn(context: *mut c_void, body_a: isocoat_body, body_b: isocoat_body) -> bool>;
-
-/// A pointer of the host that goes back to the host only.
-#[derive(Clone, Copy)]
-struct Context(*mut c_void);
-
-// SAFETY: never dereferenced here; the host is told on which threads its callbacks run.
-unsafe impl Send for Context {}
-
-impl Context {
-    /// A method, so that closures capture the whole and stay `Send`.
-    fn pointer(self) -> *mut c_void {
-        self.0
-    }
-}
 
 /// Sets who receives the messages of a world. Without one they are dropped; nothing is ever printed.
 ///

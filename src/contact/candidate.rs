@@ -34,6 +34,10 @@ pub struct Candidate {
     pub nodes: Vec<Node>,
     /// Where the two links were when the surface was integrated; none when there is more than one a side.
     reference: Option<[Placement; 2]>,
+    /// Skeletons of both are within reach of each other.
+    pub close: bool,
+    /// The surface was integrated by the last look, not kept.
+    pub fresh: bool,
     /// What each of its patches came to.
     pub loads: Vec<Sums>,
     /// What lasts from step to step.
@@ -59,23 +63,33 @@ impl Placement {
 impl Candidate {
     /// What a snapshot keeps. The rest is made anew in each step; whoever adds a field decides here.
     pub fn lasting(&self) -> &Memory {
-        let Self { bodies: _, lead: _, pair: _, material: _, surface: _, nodes: _, reference: _, loads: _, memory } =
-            self;
+        let Self {
+            bodies: _,
+            lead: _,
+            close: _,
+            pair: _,
+            material: _,
+            surface: _,
+            nodes: _,
+            reference: _,
+            fresh: _,
+            loads: _,
+            memory,
+        } = self;
         memory
     }
 
     /// Brings the contact surface up to the present poses, by a fresh integration when `fresh` or when the bodies have
-    /// moved too far against each other. Gives the evaluations of the two fields that it took.
-    pub fn look(&mut self, motions: &[Motion], settings: &Settings, fresh: bool) -> u32 {
-        let kept = !fresh && self.follow(motions, settings.tolerance);
-        if kept {
-            return 0;
+    /// moved too far against each other.
+    pub fn look(&mut self, motions: &[Motion], settings: &Settings, fresh: bool) {
+        self.fresh = fresh || !self.follow(motions, settings.tolerance);
+        if !self.fresh {
+            return;
         }
         self.pair.place(motions, self.lead);
         integrate(&self.pair, settings, &mut self.surface);
         self.nodes.clone_from(&self.surface.nodes);
         self.reference = self.placements(motions);
-        self.surface.evaluations
     }
 
     /// Where the two links are, when there is one a side.

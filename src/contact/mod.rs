@@ -19,6 +19,7 @@ pub mod press;
 pub mod seeds;
 pub mod stiffness;
 pub mod surface;
+pub mod tally;
 
 /// How the contact surface is integrated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

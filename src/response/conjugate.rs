@@ -3,9 +3,10 @@
 //! Each link's own block is the preconditioner, which takes masses, lengths and stiffnesses of any ratio out of the
 //! count; what remains goes with the longest way through the island.
 
-use nalgebra::{Cholesky, Const, Matrix6, Vector6};
+use nalgebra::{Matrix6, Vector6};
 
 use super::envelope::BLOCK;
+use crate::team::Team;
 
 /// The system.
 #[derive(Debug, Default)]
@@ -13,9 +14,37 @@ pub struct Blocks {
     diagonal: Vec<Matrix6<f64>>,
     /// Row, column below the diagonal, block.
     couplings: Vec<(u32, u32, Matrix6<f64>)>,
-    factors: Vec<Cholesky<f64, Const<6>>>,
-    buffers: [Vec<Vector6<f64>>; 4],
+    /// The couplings row by row, with those above the diagonal, and where each row's begin.
+    sources: Vec<Source>,
+    starts: Vec<u32>,
+    entries: Vec<Matrix6<f64>>,
+    rows: Vec<Row>,
+    direction: Vec<Vector6<f64>>,
+    /// Sums over some rows each.
+    sums: Vec<f64>,
 }
+
+/// What the iteration keeps of a row of blocks.
+#[derive(Clone, Copy, Debug, Default)]
+struct Row {
+    inverse: Matrix6<f64>,
+    x: Vector6<f64>,
+    residual: Vector6<f64>,
+    eased: Vector6<f64>,
+    image: Vector6<f64>,
+}
+
+/// A coupling as one of its two rows sees it.
+#[derive(Clone, Copy, Debug, Default)]
+struct Source {
+    coupling: u32,
+    other: u32,
+    /// The row is the one of the transposed block.
+    transposed: bool,
+}
+
+/// Rows whose part of a sum is made by one worker: always as many, so that sums do not depend on who makes them.
+const ROWS: usize = 64;
 
 impl Blocks {
     /// All zero, for `count` blocks.
@@ -36,67 +65,110 @@ impl Blocks {
 
     /// Solves in place, to `tolerance` of the right side in the preconditioner's measure. False when a diagonal block
     /// is not positive definite.
-    pub fn solve(&mut self, x: &mut [f64], tolerance: f64, most: usize) -> bool {
-        let Self { diagonal, couplings, factors, buffers } = self;
-        factors.clear();
-        for block in diagonal.iter() {
-            let Some(factor) = block.cholesky() else { return false };
-            factors.push(factor);
-        }
-        let [residual, eased, direction, image] = buffers;
-        for buffer in [&mut *residual, &mut *eased, &mut *direction, &mut *image] {
-            buffer.clear();
-            buffer.resize(diagonal.len(), Vector6::zeros());
-        }
-        for (residual, x) in residual.iter_mut().zip(x.chunks_exact_mut(BLOCK)) {
-            *residual = Vector6::from_column_slice(x);
-            x.fill(0.0);
-        }
-        let ease = |residual: &[Vector6<f64>], eased: &mut [Vector6<f64>]| -> f64 {
+    pub fn solve(&mut self, x: &mut [f64], tolerance: f64, most: usize, team: &Team) -> bool {
+        self.list_entries(team);
+        let Self { diagonal, sources, starts, entries, rows, direction, sums, .. } = self;
+        let count = diagonal.len();
+        rows.resize(count, Row::default());
+        direction.clear();
+        direction.resize(count, Vector6::zeros());
+        sums.resize(count.div_ceil(ROWS), 0.0);
+        // Each worker has the same rows in all that follows.
+        let block = ROWS * team.share(sums.len(), 1);
+        let right = &*x;
+        team.each_row(rows, ROWS, sums, |first, rows| {
             let mut sum = 0.0;
-            for ((residual, eased), factor) in residual.iter().zip(eased).zip(factors.iter()) {
-                *eased = *residual;
-                factor.solve_mut(eased);
-                sum += residual.dot(eased);
+            for (index, row) in rows.iter_mut().enumerate() {
+                let index = first * ROWS + index;
+                let Some(factor) = diagonal[index].cholesky() else { return f64::NAN };
+                let residual = Vector6::from_column_slice(&right[index * BLOCK..][..BLOCK]);
+                let inverse = factor.inverse();
+                let eased = inverse * residual;
+                *row = Row { inverse, residual, eased, ..Row::default() };
+                sum += residual.dot(&eased);
             }
             sum
-        };
-        let mut size = ease(residual, eased);
+        });
+        let mut size = sums.iter().sum::<f64>();
+        if size.is_nan() {
+            return false;
+        }
         let enough = tolerance * tolerance * size;
-        direction.copy_from_slice(eased);
+        let mut turn = 0.0;
         for _ in 0..most {
             if size <= enough {
                 break;
             }
-            for ((image, direction), block) in image.iter_mut().zip(direction.iter()).zip(diagonal.iter()) {
-                *image = block * direction;
-            }
-            for (i, j, block) in couplings.iter() {
-                let (i, j) = (*i as usize, *j as usize);
-                image[i] += block * direction[j];
-                image[j] += block.tr_mul(&direction[i]);
-            }
-            let bend: f64 = direction.iter().zip(image.iter()).map(|(d, i)| d.dot(i)).sum();
+            team.each_mut(direction, block, |index, direction| *direction = rows[index].eased + *direction * turn);
+            team.each_row(rows, ROWS, sums, |first, rows| {
+                let mut sum = 0.0;
+                for (index, row) in rows.iter_mut().enumerate() {
+                    let index = first * ROWS + index;
+                    row.image = diagonal[index] * direction[index];
+                    let range = starts[index] as usize..starts[index + 1] as usize;
+                    for (entry, source) in entries[range.clone()].iter().zip(&sources[range]) {
+                        row.image += entry * direction[source.other as usize];
+                    }
+                    sum += direction[index].dot(&row.image);
+                }
+                sum
+            });
+            let bend = sums.iter().sum::<f64>();
             if bend <= 0.0 {
                 break;
             }
             let part = size / bend;
-            for (x, direction) in x.chunks_exact_mut(BLOCK).zip(direction.iter()) {
-                for (x, direction) in x.iter_mut().zip(direction.iter()) {
-                    *x += part * direction;
+            team.each_row(rows, ROWS, sums, |first, rows| {
+                let mut sum = 0.0;
+                for (index, row) in rows.iter_mut().enumerate() {
+                    row.x += direction[first * ROWS + index] * part;
+                    row.residual -= row.image * part;
+                    row.eased = row.inverse * row.residual;
+                    sum += row.residual.dot(&row.eased);
                 }
-            }
-            for (residual, image) in residual.iter_mut().zip(image.iter()) {
-                *residual -= image * part;
-            }
-            let next = ease(residual, eased);
-            let turn = next / size;
+                sum
+            });
+            let next = sums.iter().sum::<f64>();
+            turn = next / size;
             size = next;
-            for (direction, eased) in direction.iter_mut().zip(eased.iter()) {
-                *direction = eased + *direction * turn;
-            }
+        }
+        for (x, row) in x.chunks_exact_mut(BLOCK).zip(rows.iter()) {
+            x.copy_from_slice(row.x.as_slice());
         }
         true
+    }
+
+    /// Lists the couplings of each row, in the order in which they were added.
+    fn list_entries(&mut self, team: &Team) {
+        let Self { diagonal, couplings, sources, starts, entries, .. } = self;
+        starts.clear();
+        starts.resize(diagonal.len() + 2, 0);
+        for (i, j, _) in couplings.iter() {
+            starts[*i as usize + 2] += 1;
+            starts[*j as usize + 2] += 1;
+        }
+        for row in 2..starts.len() {
+            starts[row] += starts[row - 1];
+        }
+        sources.clear();
+        sources.resize(2 * couplings.len(), Source::default());
+        // Filling moves each row's start, kept one place up meanwhile, to the next one's.
+        let mut list = |row: u32, source: Source| {
+            let place = &mut starts[row as usize + 1];
+            sources[*place as usize] = source;
+            *place += 1;
+        };
+        for (coupling, (i, j, _)) in couplings.iter().enumerate() {
+            let coupling = coupling as u32;
+            list(*i, Source { coupling, other: *j, transposed: false });
+            list(*j, Source { coupling, other: *i, transposed: true });
+        }
+        entries.resize(sources.len(), Matrix6::zeros());
+        team.each_mut(entries, team.share(sources.len(), 1), |index, entry| {
+            let Source { coupling, transposed, .. } = sources[index];
+            let block = &couplings[coupling as usize].2;
+            *entry = if transposed { block.transpose() } else { *block };
+        });
     }
 }
 
@@ -130,7 +202,7 @@ mod tests {
         let (mut direct, mut iterated) = (right.clone(), right);
         assert!(envelope.factor());
         envelope.solve(&mut direct);
-        assert!(blocks.solve(&mut iterated, 1e-12, 1000));
+        assert!(blocks.solve(&mut iterated, 1e-12, 1000, &Team::alone()));
         let off = direct.iter().zip(&iterated).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(off < 1e-9 * direct.iter().fold(0.0, |m: f64, x| m.max(x.abs())), "{off}");
     }

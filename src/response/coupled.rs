@@ -13,6 +13,7 @@ use super::envelope::{BLOCK, Envelope};
 use crate::base::{Inertia, Motion};
 use crate::contact::press::Material;
 use crate::math::{Mat3, Quat, Twist, Vec3, Wrench, rotate_tensor};
+use crate::team::Team;
 
 /// A point of a contact.
 #[derive(Clone, Copy, Debug)]
@@ -159,10 +160,24 @@ pub struct Coupled {
     wide: bool,
     matrix: Envelope,
     blocks_of_matrix: Blocks,
+    parts: Vec<Part>,
     residual: Vec<f64>,
     base: Vec<f64>,
     step: Vec<f64>,
 }
+
+/// A group's part of the system.
+#[derive(Clone, Debug, Default)]
+struct Part {
+    /// On b, about the group's centre.
+    push: Wrench,
+    slope: Slope,
+    /// Rows and columns of the matrix: those of two members, and of the second by the first between them.
+    blocks: [Matrix6<f64>; 3],
+}
+
+/// Least groups that a worker takes in one go.
+const GROUPS: usize = 16;
 
 /// Steps of Newton's method in one solve.
 const MOST_STEPS: usize = 60;
@@ -239,9 +254,9 @@ impl Coupled {
     ///
     /// But for the pressure's part in friction, the residual is the gradient of a convex function. Newton's method
     /// overshoots its lowest point where a slip comes to rest, so each step goes to the lowest point along it.
-    pub fn solve(&mut self, x: &mut [f64], free: &[f64], fixed: &[Motion], h: f64) -> bool {
+    pub fn solve(&mut self, x: &mut [f64], free: &[f64], fixed: &[Motion], h: f64, team: &Team) -> bool {
         self.shape(x.len() / BLOCK);
-        self.assemble(x, free, fixed, h, true);
+        self.assemble(x, free, fixed, h, true, team);
         let mut norm = self.norm(&self.residual);
         let scale = norm + self.energy(x) + self.energy(free);
         for _ in 0..MOST_STEPS {
@@ -251,13 +266,13 @@ impl Coupled {
             self.step.clone_from(&self.residual);
             // As exactly as it takes to be done after this step, or as a step of Newton's method can use.
             let enough = (0.3 * (SOLVED * scale / norm).sqrt()).clamp(GRADIENTS.0, GRADIENTS.1);
-            if !self.solve_step(enough) {
+            if !self.solve_step(enough, team) {
                 return false;
             }
             self.base.clear();
             self.base.extend_from_slice(x);
             let last = norm;
-            self.go_lowest(x, free, fixed, h);
+            self.go_lowest(x, free, fixed, h, team);
             norm = self.norm(&self.residual);
             // Sums of contact forces round off.
             if norm > 0.9 * last && norm <= 1e-16 * scale {
@@ -267,9 +282,9 @@ impl Coupled {
         norm <= 1e-10 * scale
     }
 
-    fn solve_step(&mut self, enough: f64) -> bool {
+    fn solve_step(&mut self, enough: f64, team: &Team) -> bool {
         if self.wide {
-            return self.blocks_of_matrix.solve(&mut self.step, enough, MOST_GRADIENTS);
+            return self.blocks_of_matrix.solve(&mut self.step, enough, MOST_GRADIENTS, team);
         }
         let definite = self.matrix.factor();
         if definite {
@@ -293,7 +308,7 @@ impl Coupled {
     }
 
     /// Takes the step to where the slope along it has fallen to a small part, and assembles the system there.
-    fn go_lowest(&mut self, x: &mut [f64], free: &[f64], fixed: &[Motion], h: f64) {
+    fn go_lowest(&mut self, x: &mut [f64], free: &[f64], fixed: &[Motion], h: f64, team: &Team) {
         let along = |residual: &[f64], step: &[f64]| -> f64 { residual.iter().zip(step).map(|(r, s)| r * s).sum() };
         let start = along(&self.residual, &self.step);
         let (mut low, mut slope_low) = (0.0, start);
@@ -302,7 +317,7 @@ impl Coupled {
         for look in 0..MOST_LOOKS {
             self.put_step(x, part);
             // Nearly all steps are good as a whole.
-            self.assemble(x, free, fixed, h, look == 0);
+            self.assemble(x, free, fixed, h, look == 0, team);
             let slope = along(&self.residual, &self.step);
             if slope.abs() <= FLAT * start || slope >= 0.0 && part == 1.0 {
                 if look == 0 {
@@ -322,7 +337,7 @@ impl Coupled {
             part = part.clamp(low + 0.01 * (high - low), high - 0.01 * (high - low));
         }
         self.put_step(x, part);
-        self.assemble(x, free, fixed, h, true);
+        self.assemble(x, free, fixed, h, true, team);
     }
 
     /// Square of a residual's size: the kinetic energy of the velocities that it stands for, twice.
@@ -365,7 +380,7 @@ impl Coupled {
     }
 
     /// Residual `M (x - free) - h Σ forces` and its derivative.
-    fn assemble(&mut self, x: &[f64], free: &[f64], fixed: &[Motion], h: f64, with_matrix: bool) {
+    fn assemble(&mut self, x: &[f64], free: &[f64], fixed: &[Motion], h: f64, with_matrix: bool, team: &Team) {
         if with_matrix && self.wide {
             self.blocks_of_matrix.reset(self.masses.len());
         } else if with_matrix {
@@ -382,42 +397,72 @@ impl Coupled {
                 self.add(block, block, &mass);
             }
         }
-        for index in 0..self.groups.len() {
-            let group = self.groups[index];
-            let relative = self.relative_of(&group, x, fixed);
-            let mut slope = Slope::default();
-            let push = self.respond(&group, &relative, h, with_matrix.then_some(&mut slope));
-            if push.all == Wrench::default() {
+        let mut parts = std::mem::take(&mut self.parts);
+        parts.resize_with(self.groups.len(), Part::default);
+        let block = team.share(parts.len(), GROUPS);
+        team.each_mut(&mut parts, block, |index, part| {
+            self.work_out(&self.groups[index], x, fixed, h, with_matrix, part);
+        });
+        for (index, part) in parts.iter().enumerate() {
+            if part.push != Wrench::default() {
+                self.put(self.groups[index].members, part, h, with_matrix);
+            }
+        }
+        self.parts = parts;
+    }
+
+    /// Works out a group's part of the system.
+    fn work_out(&self, group: &Group, x: &[f64], fixed: &[Motion], h: f64, with_matrix: bool, part: &mut Part) {
+        let relative = self.relative_of(group, x, fixed);
+        part.push = self.respond(group, &relative, h, with_matrix.then_some(&mut part.slope)).all;
+        let (first, end) = group.members;
+        if with_matrix && end - first <= 2 && part.push != Wrench::default() {
+            for row in 0..end - first {
+                for other in 0..=row {
+                    part.blocks[row + other] = self.block(&part.slope, first + row, first + other, h);
+                }
+            }
+        }
+    }
+
+    /// How a member's rows of the system change with the velocities of another.
+    fn block(&self, slope: &Slope, row: usize, other: usize, h: f64) -> Matrix6<f64> {
+        let (member, other) = (self.members[row], self.members[other]);
+        other.forth(&member.back(slope)).to_matrix(h * member.weight * other.weight)
+    }
+
+    /// Adds a group's part to the system.
+    fn put(&mut self, (first, end): (usize, usize), part: &Part, h: f64, with_matrix: bool) {
+        for row in first..end {
+            let member = self.members[row];
+            let i = self.blocks[member.link as usize];
+            if i == NONE {
                 continue;
             }
-            for row in group.members.0..group.members.1 {
-                let member = self.members[row];
-                let i = self.blocks[member.link as usize];
-                if i == NONE {
+            let push = member.wrench(&part.push);
+            let residual = &mut self.residual[i as usize * BLOCK..];
+            for axis in 0..3 {
+                residual[axis] -= h * member.weight * push.force[axis];
+                residual[3 + axis] -= h * member.weight * push.torque[axis];
+            }
+            if !with_matrix {
+                continue;
+            }
+            for other in first..=row {
+                let link = self.members[other].link;
+                let j = self.blocks[link as usize];
+                if j == NONE {
                     continue;
                 }
-                let part = member.wrench(&push.all);
-                let residual = &mut self.residual[i as usize * BLOCK..];
-                for axis in 0..3 {
-                    residual[axis] -= h * member.weight * part.force[axis];
-                    residual[3 + axis] -= h * member.weight * part.torque[axis];
-                }
-                if !with_matrix {
-                    continue;
-                }
-                let shifted = member.back(&slope);
-                for other in group.members.0..=row {
-                    let other = self.members[other];
-                    let j = self.blocks[other.link as usize];
-                    if j == NONE {
-                        continue;
-                    }
-                    let block = other.forth(&shifted).to_matrix(h * member.weight * other.weight);
-                    if i > j || i == j && other.link == member.link {
-                        self.add(i as usize, j as usize, &block);
-                    } else {
-                        self.add(j as usize, i as usize, &block.transpose());
-                    }
+                let block = if end - first <= 2 {
+                    part.blocks[row + other - 2 * first]
+                } else {
+                    self.block(&part.slope, row, other, h)
+                };
+                if i > j || i == j && link == member.link {
+                    self.add(i as usize, j as usize, &block);
+                } else {
+                    self.add(j as usize, i as usize, &block.transpose());
                 }
             }
         }

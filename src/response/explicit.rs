@@ -4,6 +4,7 @@ use super::substep::{Island, Work, advance};
 use crate::base::Motion;
 use crate::contact::candidate::Candidate;
 use crate::contact::surface::Settings;
+use crate::team::Team;
 
 /// Advances an island by one step of semi-implicit Euler.
 pub fn step(
@@ -13,6 +14,7 @@ pub fn step(
     dt: f64,
     settings: &Settings,
     work: &mut Work,
+    team: &Team,
 ) {
-    advance(motions, island, candidates, dt, 0.0, settings, true, work);
+    advance(motions, island, candidates, dt, 0.0, settings, true, work, team);
 }

@@ -10,6 +10,7 @@ use super::coupled::{Coupled, Grip, Group, Member, Point, Push, put_twist, twist
 use super::envelope::{BLOCK, OrderBuffers, narrow_order};
 use super::substep::{Island, PUSH_OUT, Work, bend_bristles, drift};
 use crate::base::{Inertia, Motion};
+use crate::clock::Clock;
 use crate::contact::candidate::Candidate;
 use crate::contact::pair::Pair;
 use crate::contact::patch::Sums;
@@ -18,6 +19,7 @@ use crate::contact::stiffness::reachable;
 use crate::contact::surface::Settings;
 use crate::contact::{deepest, patch};
 use crate::math::{Twist, Vec3, Wrench};
+use crate::team::Team;
 
 /// What the solver may spend.
 #[derive(Clone, Copy, Debug)]
@@ -29,6 +31,9 @@ pub struct Effort {
     /// How often a step may be split in two halves.
     pub splits: u32,
 }
+
+/// Pairs that a worker places in one go.
+const BLOCK_OF_PAIRS: usize = 16;
 
 /// Sweeps that take the approach out of the first guess.
 const SWEEPS: usize = 10;
@@ -100,6 +105,7 @@ pub fn step(
     effort: &Effort,
     solver: &mut Solver,
     work: &mut Work,
+    team: &Team,
 ) {
     (solver.rounds, solver.splits) = (0, 0);
     if island.candidates.is_empty() {
@@ -108,7 +114,7 @@ pub fn step(
     }
     solver.trial.resize(motions.len(), Motion::default());
     solver.order_links(island, candidates, motions);
-    halves(motions, island, candidates, dt, settings, effort, effort.splits, solver, work);
+    halves(motions, island, candidates, dt, settings, effort, effort.splits, solver, work, team);
 }
 
 /// Moves links that nothing touches: exact under a steady acceleration, where backward Euler would lose energy.
@@ -132,14 +138,15 @@ fn halves(
     splits: u32,
     solver: &mut Solver,
     work: &mut Work,
+    team: &Team,
 ) {
     let last_resort = splits == 0;
-    if solver.attempt(motions, island, candidates, dt, settings, effort, last_resort, work) {
+    if solver.attempt(motions, island, candidates, dt, settings, effort, last_resort, work, team) {
         return;
     }
     solver.splits += 1;
     for _ in 0..2 {
-        halves(motions, island, candidates, 0.5 * dt, settings, effort, splits - 1, solver, work);
+        halves(motions, island, candidates, 0.5 * dt, settings, effort, splits - 1, solver, work, team);
     }
 }
 
@@ -181,6 +188,7 @@ impl Solver {
         effort: &Effort,
         last_resort: bool,
         work: &mut Work,
+        team: &Team,
     ) -> bool {
         self.coupled.set_links(&self.order, motions);
         self.free.clear();
@@ -193,16 +201,19 @@ impl Solver {
             };
             put_twist(&mut self.free, block as u32, &twist);
         }
-        self.first_guess(motions, island, candidates, h);
+        let mut clock = Clock::start(work.timed);
+        self.first_guess(motions, island, candidates, h, team);
+        clock.lap(&mut work.solve_time);
         let mut converged = false;
         for _ in 0..effort.rounds {
             self.rounds += 1;
-            self.look(motions, island, candidates, h, settings, work);
-            if !self.coupled.solve(&mut self.x, &self.free, motions, h) {
-                break;
-            }
-            if self.agrees(motions, candidates, h, effort.tolerance) {
-                converged = true;
+            self.look(motions, island, candidates, h, settings, work, team);
+            clock.lap(&mut work.contact_time);
+            self.couple_all(motions, island, candidates, h);
+            let solved = self.coupled.solve(&mut self.x, &self.free, motions, h, team);
+            converged = solved && self.agrees(motions, candidates, h, effort.tolerance);
+            clock.lap(&mut work.solve_time);
+            if !solved || converged {
                 break;
             }
         }
@@ -212,27 +223,34 @@ impl Solver {
             }
             // One solve with the surfaces as they are now: what moves on is small in so short a step, and no gap closes.
             self.x.fill(0.0);
+            self.look(motions, island, candidates, h, settings, work, team);
+            clock.lap(&mut work.contact_time);
             self.last_resort = true;
-            self.look(motions, island, candidates, h, settings, work);
+            self.couple_all(motions, island, candidates, h);
             self.last_resort = false;
-            self.coupled.solve(&mut self.x, &self.free, motions, h);
+            self.coupled.solve(&mut self.x, &self.free, motions, h, team);
         }
         self.commit(motions, island, candidates, h);
+        clock.lap(&mut work.solve_time);
         true
     }
 
     /// The velocities at the start of the step, without what would carry bodies into each other.
-    fn first_guess(&mut self, motions: &[Motion], island: &Island, candidates: &mut [Candidate], h: f64) {
+    fn first_guess(&mut self, motions: &[Motion], island: &Island, candidates: &mut [Candidate], h: f64, team: &Team) {
         for link in &island.links {
             self.trial[*link as usize] = motions[*link as usize];
         }
         self.rows.clear();
-        for index in &island.candidates {
-            let candidate = &mut candidates[*index as usize];
+        team.each_at(candidates, &island.candidates, BLOCK_OF_PAIRS, |candidate| {
             candidate.pair.place(motions, candidate.lead);
-            let pair = &candidate.pair;
+        });
+        for index in &island.candidates {
+            let pair = &candidates[*index as usize].pair;
+            // Those that move are the island's, and there already.
             for link in pair.a.links.iter().chain(&pair.b.links) {
-                self.trial[*link as usize] = motions[*link as usize];
+                if !motions[*link as usize].is_movable() {
+                    self.trial[*link as usize] = motions[*link as usize];
+                }
             }
             for (i, j) in combinations(pair) {
                 let approach = deepest::approach(pair, i, j);
@@ -276,6 +294,7 @@ impl Solver {
     }
 
     /// Evaluates the contacts where the velocities lead.
+    #[expect(clippy::too_many_arguments, reason = "an island's step touches the whole state")]
     fn look(
         &mut self,
         motions: &[Motion],
@@ -284,6 +303,7 @@ impl Solver {
         h: f64,
         settings: &Settings,
         work: &mut Work,
+        team: &Team,
     ) {
         for link in &island.links {
             self.trial[*link as usize] = motions[*link as usize];
@@ -292,11 +312,14 @@ impl Solver {
             self.trial[*link as usize].twist = twist_of(&self.x, block as u32);
         }
         drift(&mut self.trial, island, h);
+        work.look(&self.trial, island, candidates, settings, true, team);
+    }
+
+    /// Puts the contact surfaces into the system.
+    fn couple_all(&mut self, motions: &[Motion], island: &Island, candidates: &[Candidate], h: f64) {
         self.coupled.clear();
         for index in &island.candidates {
-            let candidate = &mut candidates[*index as usize];
-            work.evaluations += u64::from(candidate.look(&self.trial, settings, true));
-            self.couple(candidate, *index, h);
+            self.couple(&candidates[*index as usize], *index, h);
         }
         for index in 0..self.coupled.groups.len() {
             let group = self.coupled.groups[index];

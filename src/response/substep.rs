@@ -1,13 +1,16 @@
 //! One sub-step: drift, evaluate the contact surfaces, kick, drift. Symplectic, of second order, with one evaluation.
 
 use crate::base::Motion;
+use crate::clock::Clock;
 use crate::contact::candidate::Candidate;
 use crate::contact::friction;
 use crate::contact::pair::Pair;
 use crate::contact::press::{Carriers, Grip, friction_radius, press};
 use crate::contact::surface::Settings;
+use crate::contact::tally::Tally;
 use crate::contact::{deepest::Approach, patch};
 use crate::math::{Vec3, Wrench};
+use crate::team::Team;
 
 /// Speed at which the push-out moves bodies apart, in thicknesses of the thinner coat a second.
 pub const PUSH_OUT: f64 = 2.0;
@@ -17,9 +20,12 @@ pub const PUSH_OUT: f64 = 2.0;
 pub struct Island {
     /// Slots of the links that move, each once.
     pub links: Vec<u32>,
-    /// Positions in the list of candidates.
+    /// Positions in the list of candidates, in ascending order.
     pub candidates: Vec<u32>,
 }
+
+/// Candidates that a worker looks at in one go.
+const BLOCK: usize = 4;
 
 /// Working memory of a sub-step.
 #[derive(Debug, Default)]
@@ -27,8 +33,35 @@ pub struct Work {
     grips: Vec<Grip>,
     carriers: Carriers,
     forces: Vec<Vec3>,
-    /// Evaluations of two fields since it was last cleared.
-    pub evaluations: u64,
+    /// What the contact surfaces took since it was last cleared.
+    pub tally: Tally,
+    /// Whether anybody wants to know the times.
+    pub timed: bool,
+    /// Time with contact surfaces since it was last cleared \[s\].
+    pub contact_time: f64,
+    /// Time with what follows from them \[s\].
+    pub solve_time: f64,
+}
+
+impl Work {
+    /// Brings the contact surfaces of an island up to the present poses.
+    pub fn look(
+        &mut self,
+        motions: &[Motion],
+        island: &Island,
+        candidates: &mut [Candidate],
+        settings: &Settings,
+        fresh: bool,
+        team: &Team,
+    ) {
+        team.each_at(candidates, &island.candidates, BLOCK, |candidate| candidate.look(motions, settings, fresh));
+        for index in &island.candidates {
+            let candidate = &candidates[*index as usize];
+            if candidate.fresh {
+                self.tally.add(&candidate.surface);
+            }
+        }
+    }
 }
 
 /// Advances an island by `h`, with the part `before` of the drift before the kick: a half for the symplectic second
@@ -43,11 +76,14 @@ pub fn advance(
     settings: &Settings,
     fresh: bool,
     work: &mut Work,
+    team: &Team,
 ) {
     drift(motions, island, before * h);
+    let mut clock = Clock::start(work.timed);
+    work.look(motions, island, candidates, settings, fresh, team);
+    clock.lap(&mut work.contact_time);
     for index in &island.candidates {
         let candidate = &mut candidates[*index as usize];
-        work.evaluations += u64::from(candidate.look(motions, settings, fresh));
         if candidate.material.static_friction > 0.0 {
             bend_bristles(candidate, motions, h, &mut work.carriers);
         }
@@ -61,6 +97,7 @@ pub fn advance(
     }
     rub(candidates, motions, h, work);
     drift(motions, island, (1.0 - before) * h);
+    clock.lap(&mut work.solve_time);
 }
 
 pub(super) fn drift(motions: &mut [Motion], island: &Island, h: f64) {

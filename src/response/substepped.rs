@@ -12,6 +12,7 @@ use crate::contact::pair::{Pair, Side};
 use crate::contact::stiffness::reachable;
 use crate::contact::surface::Settings;
 use crate::math::Vec3;
+use crate::team::Team;
 
 /// Most of the thinner coat that two bodies may approach in one sub-step.
 const TRAVEL: f64 = 0.25;
@@ -69,11 +70,12 @@ pub fn step(
     limits: &Limits,
     wanted: f64,
     work: &mut Work,
+    team: &Team,
 ) -> u32 {
     let substeps = wanted.min(f64::from(limits.most)) as u32;
     let h = dt / f64::from(substeps);
     for index in 0..substeps {
-        advance(motions, island, candidates, h, 0.5, settings, index == 0, work);
+        advance(motions, island, candidates, h, 0.5, settings, index == 0, work, team);
     }
     substeps
 }

@@ -38,6 +38,12 @@ pub struct WorldDesc {
     pub implicit_splits: u32,
     /// Implicit response: motion of a contact between two rounds, over its depth, that ends them, from 1e-9 to 1.
     pub implicit_tolerance: f64,
+    /// Time for which an island must be at rest before it falls asleep \[s\]: at least 0; 0 is never.
+    pub sleep_time: f64,
+    /// Speed up to which a body counts as at rest, in thicknesses of its thinnest coat a second, from 0 to 1e6.
+    pub sleep_speed: f64,
+    /// Whether steps read the clock for [`World::times`](super::World::times).
+    pub timed: bool,
 }
 
 impl Default for WorldDesc {
@@ -53,6 +59,9 @@ impl Default for WorldDesc {
             implicit_rounds: 8,
             implicit_splits: 4,
             implicit_tolerance: 0.05,
+            sleep_time: 0.0,
+            sleep_speed: 0.01,
+            timed: false,
         }
     }
 }
@@ -66,7 +75,9 @@ impl WorldDesc {
         require("substep_phase", self.substep_phase, "from 0.01 to 1", |x| (0.01..=1.0).contains(&x))?;
         require("implicit_rounds", self.implicit_rounds.into(), "from 1 to 64", |x| (1.0..=64.0).contains(&x))?;
         require("implicit_splits", self.implicit_splits.into(), "from 0 to 10", |x| (0.0..=10.0).contains(&x))?;
-        require("implicit_tolerance", self.implicit_tolerance, "from 1e-9 to 1", |x| (1e-9..=1.0).contains(&x))
+        require("implicit_tolerance", self.implicit_tolerance, "from 1e-9 to 1", |x| (1e-9..=1.0).contains(&x))?;
+        require("sleep_time", self.sleep_time, "finite and at least 0", |x| x >= 0.0)?;
+        require("sleep_speed", self.sleep_speed, "from 0 to 1e6", |x| (0.0..=1e6).contains(&x))
     }
 }
 
@@ -122,6 +133,8 @@ pub struct BodyDesc {
     pub category: u64,
     /// Which categories it touches, as bits. Two bodies touch when each one's mask has a bit of the other's category.
     pub mask: u64,
+    /// It may fall asleep, where [`WorldDesc::sleep_time`] lets bodies sleep.
+    pub may_sleep: bool,
     /// The host's own value.
     pub user_data: usize,
 }
@@ -140,6 +153,7 @@ impl Default for BodyDesc {
             dissipation: 0.0,
             category: 1,
             mask: u64::MAX,
+            may_sleep: true,
             user_data: 0,
         }
     }

@@ -89,7 +89,8 @@ impl World {
         for (link, index, skeleton) in self.skeletons_of(body) {
             let shape = skeleton.desc.shape;
             let (low, high) = swept(&shape, skeleton.profile.radius, &motions[link as usize], dt);
-            if (0..3).any(|axis| low[axis] > region.1[axis] || region.0[axis] > high[axis]) {
+            let apart = (0..3).any(|axis| low[axis] > region.1[axis] || region.0[axis] > high[axis]);
+            if apart || is_above(&shape, &motions[link as usize].pose(), skeleton.profile.radius, region) {
                 continue;
             }
             side.skeletons.push(Placed { shape, profile: skeleton.profile });
@@ -136,6 +137,14 @@ fn swept(shape: &Shape, margin: f64, motion: &Motion, dt: f64) -> (Vec3, Vec3) {
     let turned = if size.is_finite() { (motion.twist.angular.norm() * dt).min(2.0) * size } else { 0.0 };
     let any = Vec3::repeat(0.5 * motion.acceleration.norm() * dt * dt + turned);
     (low + path.inf(&Vec3::zeros()) - any, high + path.sup(&Vec3::zeros()) + any)
+}
+
+/// Whether all of a region is farther than `reach` above a plane, which has no bounds that would tell.
+fn is_above(shape: &Shape, pose: &Pose, reach: f64, region: &(Vec3, Vec3)) -> bool {
+    let Shape::Plane { point, normal } = shape.transformed(pose) else { return false };
+    let (middle, half) = ((region.0 + region.1) * 0.5, (region.1 - region.0) * 0.5);
+    // Two planes meet in a region without bounds, which is not above anything.
+    (middle - point).dot(&normal) - half.dot(&normal.abs()) > reach
 }
 
 /// What two bodies make of their surfaces (the rules are those of [`BodyDesc`](super::BodyDesc)).

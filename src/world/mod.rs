@@ -10,6 +10,7 @@ pub mod events;
 mod gather;
 pub mod query;
 mod respond;
+mod sleep;
 mod snapshot;
 mod step;
 mod units;
@@ -19,13 +20,14 @@ pub use desc::{
     BodyDesc, BodyId, LinkDesc, LinkId, Response, Scheme, SkeletonDesc, SkeletonId, StiffnessRule, VelocityConvention,
     WorldDesc,
 };
-pub use events::{Contact, Counters, Event, EventKind, LogLevel};
+pub use events::{Contact, Counters, Event, EventKind, LogLevel, Tally, Times};
 
 use crate::base::link::Kind;
 use crate::error::{Error, Result, require_finite};
 use crate::field::Profile;
 use crate::math::{Pose, Twist, Vec3, Wrench};
 use crate::response::mirror::Mirror;
+use crate::team::{Alone, Tasks};
 
 /// A body as the world keeps it.
 pub struct Body {
@@ -40,6 +42,7 @@ pub struct Body {
     pub(crate) stacked: u8,
     /// What has been said about its units since its last change.
     pub(crate) units: units::Said,
+    sleep: sleep::Sleep,
 }
 
 /// A link as the world keeps it.
@@ -114,8 +117,9 @@ pub struct World {
     bodies: Arena<Body>,
     links: Arena<Link>,
     skeletons: Arena<Skeleton>,
-    log: Option<Log>,
-    pair_filter: Option<PairFilter>,
+    log: Alone<Option<Log>>,
+    pair_filter: Alone<Option<PairFilter>>,
+    tasks: Alone<Option<Box<dyn Tasks>>>,
     stepping: step::Stepping,
 }
 
@@ -133,8 +137,9 @@ impl World {
             bodies: Arena::new(tag),
             links: Arena::new(tag),
             skeletons: Arena::new(tag),
-            log: None,
-            pair_filter: None,
+            log: Alone::default(),
+            pair_filter: Alone::default(),
+            tasks: Alone::default(),
             stepping: step::Stepping::default(),
         })
     }
@@ -148,6 +153,9 @@ impl World {
     pub fn set_desc(&mut self, desc: WorldDesc) -> Result<()> {
         desc.validate()?;
         let gravity_changes = desc.gravity != self.desc.gravity;
+        if desc != self.desc {
+            self.rouse_all();
+        }
         self.desc = desc;
         if gravity_changes {
             for index in 0..self.bodies.capacity() {
@@ -161,12 +169,19 @@ impl World {
 
     /// Sets who receives messages.
     pub fn set_log(&mut self, log: Option<Log>) {
-        self.log = log;
+        *self.log.get_mut() = log;
     }
 
     /// Sets who decides about pairs, after categories and masks.
     pub fn set_pair_filter(&mut self, filter: Option<PairFilter>) {
-        self.pair_filter = filter;
+        *self.pair_filter.get_mut() = filter;
+        self.rouse_all();
+    }
+
+    /// Sets whose threads help with the steps; without, a step is the work of the thread that calls it. Results are the
+    /// same bits for any number of workers.
+    pub fn set_tasks(&mut self, tasks: Option<Box<dyn Tasks>>) {
+        *self.tasks.get_mut() = tasks;
     }
 
     /// All bodies, in the order of their slots.
@@ -186,11 +201,14 @@ impl World {
             dissipation,
             stacked: 0,
             units: units::Said::default(),
+            sleep: sleep::Sleep::default(),
         })
     }
 
     /// Destroys a body with its links and skeletons.
     pub fn destroy_body(&mut self, id: BodyId) -> Result<()> {
+        self.bodies.get(id)?;
+        self.rouse(id.raw.index);
         let body = self.bodies.remove(id)?;
         for link in body.links {
             self.drop_link(link as usize)?;
@@ -232,6 +250,8 @@ impl World {
 
     /// Takes a body out of the simulation, or puts it back.
     pub fn set_body_enabled(&mut self, id: BodyId, enabled: bool) -> Result<()> {
+        self.bodies.get(id)?;
+        self.rouse(id.raw.index);
         let body = self.bodies.get_mut(id)?;
         body.enabled = enabled;
         for link in &body.links {
@@ -339,6 +359,7 @@ impl World {
 
     /// Brings what is derived from a body's parts up to date after a change of any of them.
     fn refresh(&mut self, slot: usize) {
+        self.rouse(slot as u32);
         self.bodies[slot].units = units::Said::default();
         self.measure(slot);
     }
@@ -462,9 +483,16 @@ impl World {
     pub fn set_link_state(&mut self, id: LinkId, state: &LinkState) -> Result<()> {
         state.validate()?;
         let link = self.links.get_mut(id)?;
+        let before = LinkState { pose: link.desc.pose, twist: link.desc.twist };
         link.desc.pose = state.pose;
         link.desc.pose.rotation.renormalize();
         link.desc.twist = state.twist;
+        let (body, movable) = (link.body, link.desc.kind != Kind::Fixed && link.desc.mass > 0.0);
+        // Nobody sleeps leaning on what moves by itself.
+        let leant_on = !movable || self.bodies[body as usize].is_asleep();
+        if leant_on && before != (LinkState { pose: self.links[id.index()].desc.pose, ..*state }) {
+            self.rouse(body);
+        }
         Ok(())
     }
 
@@ -473,7 +501,9 @@ impl World {
         self.set_link_state(id, state)?;
         let link = self.links.get_mut(id)?;
         link.mirror = Mirror::default();
-        self.stepping.forget_contacts_of(link.body);
+        let body = link.body;
+        self.rouse(body);
+        self.stepping.forget_contacts_of(body);
         Ok(())
     }
 
@@ -488,8 +518,12 @@ impl World {
     pub fn set_external_acceleration(&mut self, id: LinkId, linear: &Vec3, angular: &Vec3) -> Result<()> {
         require_finite("external_acceleration", linear)?;
         require_finite("external_angular_acceleration", angular)?;
-        let desc = &mut self.links.get_mut(id)?.desc;
+        let Link { desc, body, .. } = self.links.get_mut(id)?;
+        let (before, body) = ((desc.external_acceleration, desc.external_angular_acceleration), *body);
         (desc.external_acceleration, desc.external_angular_acceleration) = (*linear, *angular);
+        if before != (*linear, *angular) {
+            self.rouse(body);
+        }
         Ok(())
     }
 
@@ -521,8 +555,8 @@ impl World {
         add_push("angular impulse", &mut link.applied_impulse, &Wrench { force: Vec3::zeros(), torque: *impulse })
     }
 
-    /// Checks a push and gives its lever arm from the centre of mass.
-    fn check_push(&self, id: LinkId, what: &'static str, push: &Vec3, point: Option<&Vec3>) -> Result<Vec3> {
+    /// Checks a push, wakes whom it is for, and gives its lever arm from the centre of mass.
+    fn check_push(&mut self, id: LinkId, what: &'static str, push: &Vec3, point: Option<&Vec3>) -> Result<Vec3> {
         require_finite(what, push)?;
         let desc = &self.links.get(id)?.desc;
         if !matches!(desc.kind, Kind::PointMass | Kind::Rigid) {
@@ -530,9 +564,18 @@ impl World {
                 "forces and impulses go on links that the library integrates: the host pushes its own bodies itself",
             ));
         }
-        let Some(point) = point else { return Ok(Vec3::zeros()) };
-        require_finite("point", point)?;
-        Ok(point - desc.pose.transform_point(&desc.local_center))
+        let arm = match point {
+            Some(point) => {
+                require_finite("point", point)?;
+                point - desc.pose.transform_point(&desc.local_center)
+            }
+            None => Vec3::zeros(),
+        };
+        if *push != Vec3::zeros() {
+            let body = self.links.get(id)?.body;
+            self.rouse(body);
+        }
+        Ok(arm)
     }
 
     /// Mean contact force and torque on a link over the last step, about its centre of mass.
@@ -554,9 +597,15 @@ impl World {
 
 /// What the last step reported.
 impl World {
-    /// The contacts of the last step; of a sub-stepped one, as they were in its last sub-step.
+    /// The contacts of the last step; of a sub-stepped one, as they were in its last sub-step; of bodies asleep, as they
+    /// were when these fell asleep. The last come first.
     pub fn contacts(&self) -> &[Contact] {
         self.stepping.contacts()
+    }
+
+    /// How many contacts at the front are of bodies asleep, and a number that changes whenever these do.
+    pub(crate) fn resting_contacts(&self) -> (usize, u64) {
+        self.stepping.resting_contacts()
     }
 
     /// What began, ended or overloaded in the last step.
@@ -570,7 +619,13 @@ impl World {
             bodies: self.bodies.len() as u32,
             links: self.links.len() as u32,
             skeletons: self.skeletons.len() as u32,
+            asleep: self.bodies.indices().filter(|body| self.bodies[*body].is_asleep()).count() as u32,
             ..self.stepping.counters()
         }
+    }
+
+    /// Where the time of the last step went, if [`WorldDesc::timed`] asks for it.
+    pub fn times(&self) -> Times {
+        self.stepping.times()
     }
 }

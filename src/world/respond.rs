@@ -1,87 +1,249 @@
 //! The response of each island: which one, and its run.
 
+use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
+
 use super::World;
 use super::events::{Counters, LogLevel};
-use super::step::Stepping;
-use crate::base::Kind;
+use super::step::{Group, Outcome, Stepping};
+use crate::base::{Kind, Motion};
+use crate::contact::candidate::Candidate;
 use crate::contact::surface;
-use crate::response::substep::Island;
+use crate::contact::tally::Tally;
+use crate::math::Wrench;
+use crate::response::substep::{Island, Work};
 use crate::response::{Response, explicit, implicit, substepped};
+use crate::team::Team;
 
 /// Steps for which a body that was in a stack counts as in one still: a stack that rattles should not fall between two
 /// responses.
 const STACKED: u8 = 10;
 
-impl World {
-    pub(super) fn respond(&mut self, state: &mut Stepping, dt: f64) {
-        let settings = surface::Settings { scheme: self.desc.scheme, tolerance: self.desc.force_tolerance };
-        let limits = substepped::Limits { phase: self.desc.substep_phase, most: self.desc.max_substeps };
-        let effort = implicit::Effort {
-            rounds: self.desc.implicit_rounds,
-            tolerance: self.desc.implicit_tolerance,
-            splits: self.desc.implicit_splits,
-        };
-        state.work.evaluations = 0;
-        state.responses.clear();
-        state.responses.resize(self.links.capacity(), Response::Auto);
-        state.counters = Counters {
-            pairs: state.candidates.len() as u32,
-            islands: state.island_count as u32,
-            ..Counters::default()
-        };
-        self.notice_stacks(state);
-        let mut short = 0.0f64;
-        for index in 0..state.island_count {
-            let (mut response, forced) = self.choose(&state.islands[index], state);
-            let mut wanted = 1.0;
-            if response == Response::Substepped {
-                let (island, rates) = (&state.islands[index], &mut state.rates);
-                wanted = substepped::plan(&state.motions, island, &mut state.candidates, dt, &limits, rates);
-                // Too few sub-steps would gain energy without end.
-                if wanted > f64::from(limits.most) && !forced {
-                    response = Response::Implicit;
-                }
-            }
-            self.meet_hosts(state, index, response, dt);
-            let island = &state.islands[index];
-            let (motions, candidates, work) = (&mut state.motions, &mut state.candidates, &mut state.work);
-            let counters = &mut state.counters;
-            match response {
-                Response::Explicit => {
-                    explicit::step(motions, island, candidates, dt, &settings, work);
-                    counters.substeps = counters.substeps.max(1);
-                }
-                Response::Implicit => {
-                    let solver = &mut state.implicit;
-                    implicit::step(motions, island, candidates, dt, &settings, &effort, solver, work);
-                    counters.implicit_rounds = counters.implicit_rounds.max(solver.rounds);
-                    counters.implicit_splits = counters.implicit_splits.max(solver.splits);
-                }
-                Response::Auto | Response::Substepped => {
-                    let taken = substepped::step(motions, island, candidates, dt, &settings, &limits, wanted, work);
-                    counters.substeps = counters.substeps.max(taken);
-                    short = short.max(wanted / f64::from(taken));
-                }
-            }
-            // Kinematic links start every island from the host's pose.
-            for link in &island.links {
-                let motion = &mut motions[*link as usize];
-                if !motion.is_movable() {
-                    let desc = &self.links[*link as usize].desc;
-                    motion.center = desc.pose.transform_point(&desc.local_center);
-                    motion.rotation = desc.pose.rotation;
-                }
+/// Candidates from which on an island is stepped by all workers, and not by one of them beside other islands.
+const WIDE: usize = 24;
+
+/// What each worker needs for itself.
+#[derive(Debug, Default)]
+pub(super) struct Worker {
+    /// All links, for islands that are stepped beside others; once they are those of this step.
+    motions: Vec<Motion>,
+    ready: bool,
+    pub work: Work,
+    implicit: implicit::Solver,
+}
+
+/// How islands are stepped.
+struct Rules {
+    dt: f64,
+    settings: surface::Settings,
+    limits: substepped::Limits,
+    effort: implicit::Effort,
+}
+
+impl Rules {
+    fn step(
+        &self,
+        group: &mut Group,
+        motions: &mut [Motion],
+        candidates: &mut [Candidate],
+        work: &mut Work,
+        solver: &mut implicit::Solver,
+        team: &Team,
+    ) {
+        let Self { dt, settings, limits, effort } = self;
+        let island = &group.island;
+        group.driven.clear();
+        for link in &island.links {
+            let motion = &motions[*link as usize];
+            if !motion.is_movable() {
+                group.driven.push((*link, (motion.center, motion.rotation)));
             }
         }
-        state.counters.evaluations = state.work.evaluations;
+        // What leans on it elsewhere is added up in the order of the islands, whoever steps them.
+        for link in &group.supports {
+            motions[*link as usize].contact_impulse = Wrench::default();
+        }
+        group.outcome = match group.response {
+            Response::Explicit => {
+                explicit::step(motions, island, candidates, *dt, settings, work, team);
+                Outcome { substeps: 1, ..Outcome::default() }
+            }
+            Response::Implicit => {
+                implicit::step(motions, island, candidates, *dt, settings, effort, solver, work, team);
+                Outcome { rounds: solver.rounds, splits: solver.splits, ..Outcome::default() }
+            }
+            Response::Auto | Response::Substepped => {
+                let wanted = group.substeps;
+                let substeps = substepped::step(motions, island, candidates, *dt, settings, limits, wanted, work, team);
+                Outcome { substeps, ..Outcome::default() }
+            }
+        };
+        // Links that the host moves whatever happens start every island from the host's pose.
+        for (link, pose) in group.driven.iter() {
+            (motions[*link as usize].center, motions[*link as usize].rotation) = *pose;
+        }
+        group.carried.clear();
+        group.carried.extend(group.supports.iter().map(|link| motions[*link as usize].contact_impulse));
+    }
+}
+
+/// The worker, by one who has the lock to himself.
+pub(super) fn unlocked(worker: &mut Mutex<Worker>) -> &mut Worker {
+    worker.get_mut().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A worker that nobody is using, and its number.
+fn idle(workers: &[Mutex<Worker>]) -> (usize, MutexGuard<'_, Worker>) {
+    // There are as many as threads, so that one always is.
+    loop {
+        for (number, worker) in workers.iter().enumerate() {
+            match worker.try_lock() {
+                Ok(worker) => return (number, worker),
+                Err(TryLockError::Poisoned(poisoned)) => return (number, poisoned.into_inner()),
+                Err(TryLockError::WouldBlock) => {}
+            }
+        }
+    }
+}
+
+/// Steps the islands that are marked for it, each by one worker with all links for itself. Islands take their candidates
+/// along.
+fn step_beside_each_other(state: &mut Stepping, rules: &Rules, team: &Team) {
+    let Stepping { islands, candidates, motions, workers, .. } = state;
+    let groups = &mut islands[..state.island_count];
+    for group in groups.iter_mut().filter(|group| group.beside) {
+        for (place, index) in group.island.candidates.iter_mut().enumerate() {
+            group.candidates.push(std::mem::take(&mut candidates[*index as usize]));
+            group.places.push(std::mem::replace(index, place as u32));
+        }
+    }
+    team.each_mut(groups, 1, |_, group| {
+        if !group.beside {
+            return;
+        }
+        let (number, mut worker) = idle(workers);
+        let Worker { motions: own, ready, work, implicit } = &mut *worker;
+        if !std::mem::replace(ready, true) {
+            own.clone_from(motions);
+        }
+        let mut candidates = std::mem::take(&mut group.candidates);
+        rules.step(group, own, &mut candidates, work, implicit, &Team::alone());
+        (group.candidates, group.worker) = (candidates, number);
+    });
+}
+
+impl Group {
+    /// Whether one worker is enough for it.
+    fn is_small(&self) -> bool {
+        (1..WIDE).contains(&self.island.candidates.len())
+    }
+
+    /// Gives back what an island took along when it was stepped beside others, with the links that it moved.
+    fn return_to(&mut self, motions: &mut [Motion], candidates: &mut [Candidate], moved: &[Motion]) {
+        for (index, candidate) in self.candidates.drain(..).enumerate() {
+            let place = self.places[index];
+            self.island.candidates[index] = place;
+            candidates[place as usize] = candidate;
+        }
+        self.places.clear();
+        for link in self.island.links.iter().filter(|link| self.supports.binary_search(link).is_err()) {
+            motions[*link as usize] = moved[*link as usize];
+        }
+    }
+}
+
+impl World {
+    pub(super) fn respond(&mut self, state: &mut Stepping, dt: f64, team: &Team) {
+        let rules = Rules {
+            dt,
+            settings: surface::Settings { scheme: self.desc.scheme, tolerance: self.desc.force_tolerance },
+            limits: substepped::Limits { phase: self.desc.substep_phase, most: self.desc.max_substeps },
+            effort: implicit::Effort {
+                rounds: self.desc.implicit_rounds,
+                tolerance: self.desc.implicit_tolerance,
+                splits: self.desc.implicit_splits,
+            },
+        };
+        state.responses.clear();
+        state.responses.resize(self.links.capacity(), Response::Auto);
+        self.notice_stacks(state);
+        for index in 0..state.island_count {
+            let (mut response, forced) = self.choose(&state.islands[index].island, state);
+            if response == Response::Substepped {
+                let (island, rates) = (&state.islands[index].island, &mut state.rates);
+                let wanted = substepped::plan(&state.motions, island, &mut state.candidates, dt, &rules.limits, rates);
+                // Too few sub-steps would gain energy without end.
+                if wanted > f64::from(rules.limits.most) && !forced {
+                    response = Response::Implicit;
+                }
+                state.islands[index].substeps = wanted;
+            }
+            state.islands[index].response = response;
+            self.meet_hosts(state, index, response, dt);
+        }
+        while state.workers.len() < team.workers() {
+            state.workers.push(Mutex::default());
+        }
+        for worker in &mut state.workers {
+            let Worker { ready, work, .. } = unlocked(worker);
+            (*ready, work.tally, work.timed) = (false, Tally::default(), self.desc.timed);
+            (work.contact_time, work.solve_time) = (0.0, 0.0);
+        }
+        let groups = &mut state.islands[..state.island_count];
+        let several = team.workers() > 1 && groups.iter().filter(|group| group.is_small()).count() > 1;
+        for group in groups.iter_mut() {
+            group.beside = several && group.is_small();
+        }
+        if several {
+            step_beside_each_other(state, &rules, team);
+        }
+        let groups = &mut state.islands[..state.island_count];
+        let Worker { work, implicit, .. } = unlocked(&mut state.workers[0]);
+        for group in groups.iter_mut().filter(|group| !group.beside) {
+            rules.step(group, &mut state.motions, &mut state.candidates, work, implicit, team);
+        }
+        self.gather_up(state, &rules.limits);
+    }
+
+    /// What the islands come to, in their order.
+    fn gather_up(&mut self, state: &mut Stepping, limits: &substepped::Limits) {
+        let Stepping { islands, workers, motions, candidates, .. } = state;
+        let groups = &mut islands[..state.island_count];
+        let mut counters =
+            Counters { pairs: candidates.len() as u32, islands: groups.len() as u32, ..Counters::default() };
+        let mut short = 0.0f64;
+        for group in groups.iter_mut() {
+            if group.beside {
+                group.return_to(motions, candidates, &unlocked(&mut workers[group.worker]).motions);
+            }
+            let Outcome { substeps, rounds, splits } = group.outcome;
+            counters.substeps = counters.substeps.max(substeps);
+            counters.implicit_rounds = counters.implicit_rounds.max(rounds);
+            counters.implicit_splits = counters.implicit_splits.max(splits);
+            if group.response == Response::Substepped {
+                short = short.max(group.substeps / f64::from(substeps));
+            }
+            for link in &group.supports {
+                motions[*link as usize].contact_impulse = Wrench::default();
+            }
+        }
+        for group in groups {
+            for (link, carried) in group.supports.iter().zip(&group.carried) {
+                motions[*link as usize].contact_impulse.add_scaled(carried, 1.0);
+            }
+        }
+        for worker in workers {
+            counters.by_scheme.merge(&unlocked(worker).work.tally);
+        }
+        counters.evaluations = counters.by_scheme.total();
+        state.counters = counters;
         if short > 1.0
-            && let Some(log) = &mut self.log
+            && let Some(log) = self.log.get_mut()
         {
             let text = format!(
                 "the stiffest contact asks for {:.0} sub-steps, max_substeps allows {}: raise it, or lower \
                  stiffness_scale or dt",
-                short * f64::from(self.desc.max_substeps),
-                self.desc.max_substeps
+                short * f64::from(limits.most),
+                limits.most
             );
             log(LogLevel::Warning, &text);
         }
@@ -97,7 +259,7 @@ impl World {
             }
         }
         for index in 0..self.bodies.capacity() {
-            if self.bodies.is_live(index) {
+            if self.bodies.is_live(index) && !self.bodies[index].is_asleep() {
                 let body = &mut self.bodies[index];
                 body.stacked = if state.touches[index] >= 2 { STACKED } else { body.stacked.saturating_sub(1) };
             }
@@ -131,7 +293,7 @@ impl World {
 
     /// Gives host-driven links the velocities that a response starts from.
     fn meet_hosts(&mut self, state: &mut Stepping, index: usize, response: Response, dt: f64) {
-        for link in &state.islands[index].links {
+        for link in &state.islands[index].island.links {
             let slot = *link as usize;
             state.responses[slot] = response;
             if self.links[slot].desc.kind == Kind::Host

@@ -16,9 +16,10 @@
 use std::hash::{BuildHasher, RandomState};
 
 use super::bytes::{Counter, Cursor, Lasting, Reader, Sink, enums, structs, write_list};
+use super::sleep::Sleep;
 use super::{
-    Body, BodyDesc, Link, LinkDesc, Skeleton, SkeletonDesc, StiffnessRule, World, WorldDesc, check_plane, desc, step,
-    units::Said,
+    Body, BodyDesc, Contact, Link, LinkDesc, Skeleton, SkeletonDesc, StiffnessRule, World, WorldDesc, check_plane,
+    desc, step, units::Said,
 };
 use crate::base::Kind;
 use crate::contact::Scheme;
@@ -26,13 +27,14 @@ use crate::contact::candidate::Memory;
 use crate::contact::friction::Bristle;
 use crate::error::{Error, Result, require, require_finite};
 use crate::field::{Profile, Shape};
-use crate::handle::{Arena, Noun, RawId, Slot, WorldTag};
+use crate::handle::{Arena, Id, Noun, RawId, Slot, WorldTag};
 use crate::math::{Pose, Twist, Wrench};
 use crate::response::mirror::Mirror;
 use crate::response::{Response, VelocityConvention};
+use crate::team::Alone;
 
 /// What the lists below say. Another number is refused: no snapshot is ever half understood.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 const MAGIC: [u8; 8] = *b"isocoat\0";
 /// Offsets of the parts of the header.
 const FORMAT_AT: usize = 8;
@@ -55,11 +57,11 @@ const VERSION: [u8; LENGTH_AT - VERSION_AT] = {
 structs! {
     WorldDesc {
         gravity, response, scheme, force_tolerance, seed_count, max_substeps, substep_phase, implicit_rounds,
-        implicit_splits, implicit_tolerance,
+        implicit_splits, implicit_tolerance, sleep_time, sleep_speed, timed,
     }
     BodyDesc {
         rigid, response, isovalue, stiffness_scale, stiffness, friction, static_friction, viscous_friction, dissipation,
-        category, mask, user_data,
+        category, mask, may_sleep, user_data,
     }
     LinkDesc {
         kind, pose, twist, mass, local_center, inertia, gravity_scale, external_acceleration,
@@ -68,18 +70,23 @@ structs! {
     }
     SkeletonDesc { shape, thickness, stiffness, stiffening, radius, seed_count, user_data }
     // What the descriptor comes to follows from the parts.
-    Body { desc, links, enabled, stacked, units; stiffness_scale: 0.0, dissipation: 0.0 }
+    Body { desc, links, enabled, stacked, units, sleep; stiffness_scale: 0.0, dissipation: 0.0 }
     Link {
         desc, body, skeletons, enabled, applied_force, applied_impulse, contact_impulse, host_impulse, last_dt, mirror,
     }
     // The profile and the reach follow from the descriptors; the rays are made at their first use.
     Skeleton { desc, link, enabled; profile: NO_PROFILE, reach: 0.0, rays: Default::default() }
     Said { sink, travel }
+    Sleep { quiet, group }
     Mirror {
         active, twist, expected_center, expected_rotation, expected_twist, commanded, owed, estimate, bypassed, doubt,
     }
     Memory { ids, touching, touched, overloaded, was_overloaded, rate2, bristles }
     Bristle { key, slip, turn, sliding, seen }
+    Contact {
+        bodies, links, skeletons, position, normal, force, torque, area, peak_pressure, stiffness, error_estimate,
+        evaluations, scheme, overloaded,
+    }
     // The tag is that of the world that restores it.
     RawId { index, generation; world: 0 }
     Pose { position, rotation }
@@ -97,6 +104,16 @@ enums! {
 /// Until [`World::derive`] gives the right one.
 const NO_PROFILE: Profile =
     Profile { isovalue: 0.0, thickness: 0.0, stiffness: 0.0, stiffening: 0.0, radius: 0.0, cap: 0.0 };
+
+impl<T: Noun> Lasting for Id<T> {
+    fn write(&self, out: &mut impl Sink) {
+        self.raw.write(out);
+    }
+
+    fn read(from: &mut Reader) -> Result<Self> {
+        RawId::read(from).map(Self::from_raw)
+    }
+}
 
 impl Lasting for StiffnessRule {
     fn write(&self, out: &mut impl Sink) {
@@ -249,14 +266,20 @@ impl World {
     }
 
     fn write(&self, out: &mut impl Sink) {
-        let Self { desc, origin, own_tag: _, bodies, links, skeletons, log: _, pair_filter: _, stepping } = self;
+        let Self { desc, origin, own_tag: _, bodies, links, skeletons, log: _, pair_filter: _, tasks: _, stepping } =
+            self;
         origin.write(out);
         desc.write(out);
         write_arena(bodies, out);
         write_arena(links, out);
         write_arena(skeletons, out);
-        let candidates = stepping.lasting();
+        let (candidates, resting, contacts) = stepping.lasting();
         write_list(candidates.len(), candidates.iter().map(|candidate| candidate.lasting()), out);
+        write_list(resting.len(), resting.iter(), out);
+        // Who has just been woken has none any more.
+        let rests =
+            |contact: &&Contact| contact.bodies.iter().any(|id| self.bodies.get(*id).is_ok_and(Body::is_asleep));
+        write_list(contacts.iter().filter(rests).count(), contacts.iter().filter(rests), out);
     }
 
     /// Puts a world back to what a snapshot says; stepping on gives the same bits as never having stopped. A snapshot
@@ -279,11 +302,14 @@ impl World {
             bodies: read_arena(&mut from)?,
             links: read_arena(&mut from)?,
             skeletons: read_arena(&mut from)?,
-            log: None,
-            pair_filter: None,
+            log: Alone::default(),
+            pair_filter: Alone::default(),
+            tasks: Alone::default(),
             stepping: step::Stepping::default(),
         };
         let mut memories: Vec<Memory> = from.read("pairs of bodies")?;
+        let mut resting: Vec<Memory> = from.read("pairs of bodies asleep")?;
+        let mut contacts: Vec<Contact> = from.read("contacts of bodies asleep")?;
         if from.left() > 0 {
             return Err(Error::Snapshot(format!("{} bytes are left over", from.left())));
         }
@@ -291,6 +317,7 @@ impl World {
         fresh.check_state()?;
         fresh.derive()?;
         fresh.check_memories(&memories)?;
+        fresh.check_sleep(&resting, &contacts)?;
 
         // From here on nothing fails.
         let tag = if fresh.origin == self.origin {
@@ -307,14 +334,20 @@ impl World {
         fresh.bodies.set_world(tag);
         fresh.links.set_world(tag);
         fresh.skeletons.set_world(tag);
-        for id in memories.iter_mut().flat_map(|memory| &mut memory.ids) {
+        for id in memories.iter_mut().chain(&mut resting).flat_map(|memory| &mut memory.ids) {
             id.world = tag;
         }
+        for Contact { bodies, links, skeletons, .. } in &mut contacts {
+            bodies.iter_mut().for_each(|id| id.raw.world = tag);
+            links.iter_mut().for_each(|id| id.raw.world = tag);
+            skeletons.iter_mut().for_each(|id| id.raw.world = tag);
+        }
         fresh.take_rays_of(self);
-        let World { desc, origin, own_tag: _, bodies, links, skeletons, log: _, pair_filter: _, stepping: _ } = fresh;
+        let World { desc, origin, own_tag: _, bodies, links, skeletons, log: _, pair_filter: _, tasks: _, stepping: _ } =
+            fresh;
         (self.desc, self.origin) = (desc, origin);
         (self.bodies, self.links, self.skeletons) = (bodies, links, skeletons);
-        self.stepping.restart(memories);
+        self.stepping.restart(memories, resting, contacts);
         Ok(())
     }
 
@@ -389,6 +422,34 @@ impl World {
             }
         }
         Ok(())
+    }
+
+    /// Who sleeps, with whom, and what is kept of their contacts.
+    fn check_sleep(&self, resting: &[Memory], contacts: &[Contact]) -> Result<()> {
+        let refuse = |body: usize, why: &str| Err(Error::Snapshot(format!("body {body}: {why}")));
+        for index in self.bodies.indices() {
+            let Sleep { quiet, group } = self.bodies[index].sleep;
+            require("time at rest", quiet, "finite and at least 0", |x| x >= 0.0)
+                .map_err(|error| refused(format_args!("body {index}"), error))?;
+            let first = group as usize;
+            if group != 0 && !(first <= index + 1 && self.is_in_group(first - 1, group)) {
+                return refuse(index, "sleeps in a group whose first body does not");
+            }
+        }
+        self.check_memories(resting)?;
+        for contact in contacts {
+            let live = contact.bodies.iter().all(|id| self.bodies.is_live(id.index()))
+                && contact.links.iter().all(|id| self.links.is_live(id.index()))
+                && contact.skeletons.iter().all(|id| self.skeletons.is_live(id.index()));
+            if !live || !contact.bodies.iter().any(|id| self.bodies[id.index()].is_asleep()) {
+                return refuse(contact.bodies[0].index(), "has a contact at rest, but nobody is asleep");
+            }
+        }
+        Ok(())
+    }
+
+    fn is_in_group(&self, body: usize, group: u32) -> bool {
+        self.bodies.is_live(body) && self.bodies[body].sleep.group == group
     }
 
     /// Takes over the rays of skeletons that are the same: to roll back is not to make them again.

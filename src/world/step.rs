@@ -1,16 +1,24 @@
 //! The pipeline of one step: hosts' poses in, candidate pairs, islands, response, impulses and events out.
 
-use super::events::{Contact, Counters, Event, EventKind, LogLevel};
+use std::sync::Mutex;
+
+use super::events::{Contact, Counters, Event, EventKind, LogLevel, Times};
+use super::respond::{Worker, unlocked};
 use super::{BodyId, Link, World, units};
 use crate::base::{Kind, Motion};
+use crate::clock::Clock;
 use crate::contact::broad_phase::{self, Bounds};
 use crate::contact::candidate::{Candidate, Memory};
 use crate::contact::{pair::Side, surface};
 use crate::error::{Result, require};
-use crate::math::Wrench;
+use crate::math::{Quat, Vec3, Wrench};
+use crate::response::Response;
 use crate::response::mirror::Host;
-use crate::response::substep::{Island, Work};
-use crate::response::{Response, implicit};
+use crate::response::substep::Island;
+use crate::team::Team;
+
+/// Candidates that a worker fills in one go.
+const FILLED: usize = 16;
 
 /// What the pipeline keeps between steps, and its buffers.
 #[derive(Default)]
@@ -19,31 +27,74 @@ pub(crate) struct Stepping {
     pub(super) motions: Vec<Motion>,
     /// How each link was moved, by slot.
     pub(super) responses: Vec<Response>,
-    bounds: Vec<Bounds>,
-    bounds_of: Vec<usize>,
-    pairs: Vec<[u32; 2]>,
+    pub(super) bounds: Vec<Bounds>,
+    pub(super) bounds_of: Vec<usize>,
+    pub(super) pairs: Vec<[u32; 2]>,
     /// In the order of their bodies.
     pub(super) candidates: Vec<Candidate>,
     /// Those of the last step, then their memory for reuse.
     previous: Vec<Candidate>,
-    spare: Vec<Candidate>,
-    pub(super) islands: Vec<Island>,
+    pub(super) spare: Vec<Candidate>,
+    /// Of the pairs that are asleep, in the order of their bodies.
+    pub(super) resting: Vec<Memory>,
+    /// How many contacts at the front are of bodies asleep, and a number that changes whenever these do.
+    pub(super) resting_contacts: usize,
+    pub(super) rest_revision: u64,
+    /// The motions of links asleep are in place.
+    settled: bool,
+    pub(super) probe: Candidate,
+    pub(super) islands: Vec<Group>,
     pub(super) island_count: usize,
     roots: Vec<u32>,
     island_of: Vec<u32>,
     /// Contacts at the end of the last step, by slot of the body.
     pub(super) touches: Vec<u32>,
     pub(super) rates: Vec<f64>,
-    pub(super) work: Work,
-    pub(super) implicit: implicit::Solver,
-    contacts: Vec<Contact>,
+    /// Working memory of each worker; the first always is the thread that steps.
+    pub(super) workers: Vec<Mutex<Worker>>,
+    pub(super) contacts: Vec<Contact>,
     events: Vec<Event>,
     pub(super) counters: Counters,
+    pub(super) times: Times,
+}
+
+/// An island, and what the world notes about it.
+#[derive(Debug, Default)]
+pub(super) struct Group {
+    pub island: Island,
+    pub response: Response,
+    /// Sub-steps that it asks for.
+    pub substeps: f64,
+    /// Links that it leans on: they do not move, and other islands may lean on them too.
+    pub supports: Vec<u32>,
+    /// The contact impulses that they got from it.
+    pub carried: Vec<Wrench>,
+    /// Its own candidates and their places, while it is stepped beside others.
+    pub candidates: Vec<Candidate>,
+    pub places: Vec<u32>,
+    /// Links that the host moves whatever happens, with the poses that they start from.
+    pub driven: Vec<(u32, (Vec3, Quat))>,
+    /// It is stepped beside others, by which worker, and what came out.
+    pub beside: bool,
+    pub worker: usize,
+    pub outcome: Outcome,
+}
+
+/// What stepping an island took.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Outcome {
+    pub substeps: u32,
+    pub rounds: u32,
+    pub splits: u32,
 }
 
 impl Stepping {
     pub fn contacts(&self) -> &[Contact] {
         &self.contacts
+    }
+
+    pub fn resting_contacts(&self) -> (usize, u64) {
+        (self.resting_contacts, self.rest_revision)
     }
 
     pub fn events(&self) -> &[Event] {
@@ -54,10 +105,19 @@ impl Stepping {
         self.counters
     }
 
+    pub fn times(&self) -> Times {
+        self.times
+    }
+
     /// What a snapshot keeps. The rest are buffers and reports; whoever adds a field decides here.
-    pub fn lasting(&self) -> &[Candidate] {
+    pub fn lasting(&self) -> (&[Candidate], &[Memory], &[Contact]) {
         let Self {
             candidates,
+            resting,
+            resting_contacts,
+            rest_revision: _,
+            settled: _,
+            probe: _,
             motions: _,
             responses: _,
             bounds: _,
@@ -71,17 +131,18 @@ impl Stepping {
             island_of: _,
             touches: _,
             rates: _,
-            work: _,
-            implicit: _,
-            contacts: _,
+            workers: _,
+            contacts,
             events: _,
             counters: _,
+            times: _,
         } = self;
-        candidates
+        (candidates, resting, &contacts[..*resting_contacts])
     }
 
-    /// Goes on from what a snapshot has kept, in the buffers that are there. Nothing is reported until the next step.
-    pub fn restart(&mut self, memories: Vec<Memory>) {
+    /// Goes on from what a snapshot has kept, in the buffers that are there. Until the next step nothing is reported but
+    /// the contacts of those who sleep.
+    pub fn restart(&mut self, memories: Vec<Memory>, resting: Vec<Memory>, contacts: Vec<Contact>) {
         // Whose buffers a candidate has does not matter: those that stay where they are need not be moved.
         while self.candidates.len() < memories.len() {
             self.candidates.push(self.spare.pop().unwrap_or_default());
@@ -91,15 +152,18 @@ impl Stepping {
             candidate.bodies = memory.ids.map(|id| id.index);
             candidate.memory = memory;
         }
-        self.contacts.clear();
+        (self.resting, self.settled) = (resting, false);
+        (self.resting_contacts, self.contacts) = (contacts.len(), contacts);
+        self.rest_revision += 1;
         self.events.clear();
-        self.counters = Counters::default();
+        (self.counters, self.times) = (Counters::default(), Times::default());
     }
 
     /// What the contacts of a body went through no longer counts: it was put elsewhere.
     pub fn forget_contacts_of(&mut self, body: u32) {
-        for candidate in self.candidates.iter_mut().filter(|candidate| candidate.bodies.contains(&body)) {
-            candidate.memory.forget_history();
+        let memories = self.candidates.iter_mut().map(|candidate| &mut candidate.memory).chain(&mut self.resting);
+        for memory in memories.filter(|memory| memory.ids.iter().any(|id| id.index == body)) {
+            memory.forget_history();
         }
     }
 }
@@ -109,25 +173,47 @@ impl World {
     /// are worked out that the host is to apply before it advances by the same `dt`.
     pub fn step(&mut self, dt: f64) -> Result<()> {
         require("dt", dt, "> 0 and at most 10 s (and at least 1e-12 s)", |x| (1e-12..=10.0).contains(&x))?;
+        let mut tasks = self.tasks.get_mut().take();
         let mut state = std::mem::take(&mut self.stepping);
-        self.begin(&mut state, dt);
-        self.find_candidates(&mut state, dt);
-        self.check_units(&state, dt);
-        self.group(&mut state);
-        self.respond(&mut state, dt);
-        self.finish(&mut state, dt);
-        self.report(&mut state);
+        Team::with(tasks.as_deref_mut(), |team| self.run(&mut state, dt, team));
         self.stepping = state;
+        *self.tasks.get_mut() = tasks;
         Ok(())
+    }
+
+    /// The pipeline.
+    fn run(&mut self, state: &mut Stepping, dt: f64, team: &Team) {
+        let timed = self.desc.timed;
+        let (mut whole, mut clock, mut times) = (Clock::start(timed), Clock::start(timed), Times::default());
+        self.begin(state, dt);
+        clock.lap(&mut times.begin);
+        self.find_candidates(state, dt, team);
+        self.check_units(state, dt);
+        clock.lap(&mut times.pairs);
+        self.group(state);
+        clock.lap(&mut times.islands);
+        self.respond(state, dt, team);
+        clock.lap(&mut times.respond);
+        self.finish(state, dt);
+        self.report(state);
+        self.let_sleep(state, dt);
+        clock.lap(&mut times.report);
+        whole.lap(&mut times.step);
+        for worker in &mut state.workers {
+            let work = &unlocked(worker).work;
+            times.contact += work.contact_time;
+            times.solve += work.solve_time;
+        }
+        state.times = times;
     }
 
     /// Motions from the descriptors, host-driven ones through their mirrors; the host's pushes on our own.
     fn begin(&mut self, state: &mut Stepping, dt: f64) {
-        state.motions.clear();
+        let settled = std::mem::replace(&mut state.settled, true);
         state.motions.resize(self.links.capacity(), Motion::default());
         state.rates.resize(self.links.capacity(), 0.0);
         for index in 0..self.links.capacity() {
-            if !self.links.is_live(index) {
+            if !self.links.is_live(index) || settled && self.sleeps(&self.links[index]) {
                 continue;
             }
             let mut motion = self.motion_of(&self.links[index]);
@@ -153,7 +239,7 @@ impl World {
     }
 
     /// Pairs of bodies whose bounds meet and that may touch.
-    fn find_candidates(&mut self, state: &mut Stepping, dt: f64) {
+    fn find_candidates(&mut self, state: &mut Stepping, dt: f64, team: &Team) {
         state.bounds.clear();
         for index in self.bodies.indices() {
             if self.bodies[index].enabled {
@@ -166,13 +252,16 @@ impl World {
         for (position, bounds) in state.bounds.iter().enumerate() {
             state.bounds_of[bounds.body as usize] = position;
         }
+        self.wake_touched(state, dt);
         std::mem::swap(&mut state.candidates, &mut state.previous);
+        let mut filter = self.pair_filter.get_mut().take();
+        state.pairs.retain(|pair| {
+            let asleep = pair.iter().any(|body| self.bodies[*body as usize].is_asleep());
+            !asleep && self.may_touch(pair, &state.motions, &mut filter)
+        });
+        *self.pair_filter.get_mut() = filter;
         let mut old = 0;
-        let mut filter = self.pair_filter.take();
         for pair in &state.pairs {
-            if !self.may_touch(pair, &state.motions, &mut filter) {
-                continue;
-            }
             while old < state.previous.len() && state.previous[old].bodies < *pair {
                 old += 1;
             }
@@ -184,23 +273,30 @@ impl World {
             } else {
                 let mut fresh = state.spare.pop().unwrap_or_default();
                 fresh.memory.forget();
+                fresh.memory.ids = ids;
                 fresh
             };
             candidate.bodies = *pair;
-            let bounds = pair.map(|body| &state.bounds[state.bounds_of[body as usize]]);
-            if self.fill(&mut candidate, &state.motions, bounds, dt) {
-                candidate.memory.touched = false;
-                state.candidates.push(candidate);
-            } else if known {
-                state.previous[old] = candidate;
-            } else {
-                state.spare.push(candidate);
-            }
+            state.candidates.push(candidate);
         }
-        self.pair_filter = filter;
+        let (motions, bounds, bounds_of) = (&state.motions, &state.bounds, &state.bounds_of);
+        team.each_mut(&mut state.candidates, FILLED, |_, candidate| {
+            let bounds = candidate.bodies.map(|body| &bounds[bounds_of[body as usize]]);
+            candidate.close = self.fill(candidate, motions, bounds, dt);
+            candidate.memory.touched = false;
+        });
+        // What no skeleton is close enough for goes back to where it came from.
+        for candidate in state.candidates.extract_if(.., |candidate| !candidate.close) {
+            state.previous.push(candidate);
+        }
     }
 
-    fn may_touch(&self, pair: &[u32; 2], motions: &[Motion], filter: &mut Option<super::PairFilter>) -> bool {
+    pub(super) fn may_touch(
+        &self,
+        pair: &[u32; 2],
+        motions: &[Motion],
+        filter: &mut Option<super::PairFilter>,
+    ) -> bool {
         let [a, b] = pair.map(|body| &self.bodies[body as usize]);
         // A host-driven kinematic link may still have its wrench asked for: only bodies that are fixed all over are
         // skipped.
@@ -220,14 +316,14 @@ impl World {
 
     /// Says once a body when its units cannot work.
     fn check_units(&mut self, state: &Stepping, dt: f64) {
-        let Some(mut log) = self.log.take() else { return };
+        let Some(mut log) = self.log.get_mut().take() else { return };
         for index in 0..self.bodies.capacity() {
             if self.bodies.is_live(index) && self.bodies[index].enabled {
                 let warned = units::check(self, index, &state.motions, dt, &mut |text| log(LogLevel::Warning, text));
                 self.bodies[index].units = warned;
             }
         }
-        self.log = Some(log);
+        *self.log.get_mut() = Some(log);
     }
 
     /// Islands: bodies that touch, directly or through others that can move.
@@ -242,8 +338,10 @@ impl World {
             }
             body
         }
-        let movable =
-            |body: u32| self.bodies[body as usize].links.iter().any(|link| state.motions[*link as usize].is_movable());
+        let movable = |body: u32| {
+            let body = &self.bodies[body as usize];
+            !body.is_asleep() && body.links.iter().any(|link| state.motions[*link as usize].is_movable())
+        };
         for candidate in &state.candidates {
             let [a, b] = candidate.bodies;
             if movable(a) && movable(b) {
@@ -251,19 +349,20 @@ impl World {
                 state.roots[a.max(b) as usize] = a.min(b);
             }
         }
-        for island in &mut state.islands {
-            island.links.clear();
-            island.candidates.clear();
+        for group in &mut state.islands {
+            group.island.links.clear();
+            group.island.candidates.clear();
+            group.supports.clear();
         }
         state.island_of.clear();
         state.island_of.resize(bodies, u32::MAX);
         let mut count = 0;
-        let mut island_for = |root: u32, islands: &mut Vec<Island>, island_of: &mut [u32]| {
+        let mut island_for = |root: u32, islands: &mut Vec<Group>, island_of: &mut [u32]| {
             if island_of[root as usize] == u32::MAX {
                 island_of[root as usize] = count as u32;
                 count += 1;
                 if islands.len() < count {
-                    islands.push(Island::default());
+                    islands.push(Group::default());
                 }
             }
             island_of[root as usize] as usize
@@ -272,7 +371,7 @@ impl World {
             let [a, b] = candidate.bodies;
             let root = find(&mut state.roots, if movable(a) { a } else { b });
             let island = island_for(root, &mut state.islands, &mut state.island_of);
-            state.islands[island].candidates.push(index as u32);
+            state.islands[island].island.candidates.push(index as u32);
         }
         for body in self.bodies.indices() {
             if !self.bodies[body].enabled {
@@ -282,30 +381,35 @@ impl World {
             if movable(body as u32) {
                 let root = find(&mut state.roots, body as u32);
                 let island = island_for(root, &mut state.islands, &mut state.island_of);
-                state.islands[island].links.extend(&self.bodies[body].links);
+                state.islands[island].island.links.extend(&self.bodies[body].links);
             }
         }
         state.island_count = count;
-        for island in &mut state.islands[..count] {
+        for Group { island, supports, .. } in &mut state.islands[..count] {
             for index in &island.candidates {
-                for body in state.candidates[*index as usize].bodies {
-                    if !movable(body) {
-                        let moving = |link: &&u32| self.links[**link as usize].desc.kind == Kind::Host;
-                        for link in self.bodies[body as usize].links.iter().filter(moving) {
-                            if !island.links.contains(link) {
-                                island.links.push(*link);
-                            }
+                let candidate = &state.candidates[*index as usize];
+                for (body, side) in candidate.bodies.into_iter().zip([&candidate.pair.a, &candidate.pair.b]) {
+                    if movable(body) {
+                        continue;
+                    }
+                    supports.extend(&side.links);
+                    let moving = |link: &&u32| self.links[**link as usize].desc.kind == Kind::Host;
+                    for link in self.bodies[body as usize].links.iter().filter(moving) {
+                        if !island.links.contains(link) {
+                            island.links.push(*link);
                         }
                     }
                 }
             }
+            supports.sort_unstable();
+            supports.dedup();
         }
     }
 
     /// Writes back what moved, and what the host is to do.
     fn finish(&mut self, state: &mut Stepping, dt: f64) {
         for index in 0..self.links.capacity() {
-            if !self.links.is_live(index) {
+            if !self.links.is_live(index) || self.sleeps(&self.links[index]) {
                 continue;
             }
             let motion = &state.motions[index];
@@ -333,6 +437,10 @@ impl World {
         }
     }
 
+    fn sleeps(&self, link: &Link) -> bool {
+        self.bodies[link.body as usize].is_asleep()
+    }
+
     /// What of a host-driven link matters to its mirror.
     pub(super) fn host(&self, link: &Link) -> Host {
         Host {
@@ -345,7 +453,7 @@ impl World {
 
     /// Contacts and events.
     fn report(&mut self, state: &mut Stepping) {
-        state.contacts.clear();
+        self.keep_resting_contacts(state);
         state.events.clear();
         // Pairs that are no longer candidates cannot touch.
         for mut gone in state.previous.drain(..) {

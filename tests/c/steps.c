@@ -91,6 +91,7 @@ static void everything_is_locked(filter_calls *all)
     isocoat_link_desc link_desc = isocoat_link_desc_default();
     isocoat_skeleton_desc skeleton_desc = isocoat_skeleton_desc_default();
     isocoat_counters counters = isocoat_counters_default();
+    isocoat_times times = isocoat_times_default();
     isocoat_debug_draw draw = isocoat_debug_draw_default();
     const isocoat_contact *contacts;
     const isocoat_event *events;
@@ -117,6 +118,8 @@ static void everything_is_locked(filter_calls *all)
     REFUSED(isocoat_world_get_contacts(world, &contacts, &count), locked, why);
     REFUSED(isocoat_world_get_events(world, &events, &count), locked, why);
     REFUSED(isocoat_world_get_counters(world, &counters), locked, why);
+    REFUSED(isocoat_world_get_times(world, &times), locked, why);
+    REFUSED(isocoat_world_set_tasks(world, 1, NULL, NULL, NULL), locked, why);
     REFUSED(isocoat_world_get_bodies(world, &b.body, 1, &count), locked, why);
     REFUSED(isocoat_world_snapshot(world, NULL, 0, &count), locked, why);
     REFUSED(isocoat_world_restore(world, NULL, 0), locked, why);
@@ -134,6 +137,8 @@ static void everything_is_locked(filter_calls *all)
     REFUSED(isocoat_body_set_desc(world, b.body, &body_desc), locked, why);
     REFUSED(isocoat_body_set_enabled(world, b.body, true), locked, why);
     REFUSED(isocoat_body_is_enabled(world, b.body, &flag), locked, why);
+    REFUSED(isocoat_body_is_awake(world, b.body, &flag), locked, why);
+    REFUSED(isocoat_body_wake(world, b.body), locked, why);
     REFUSED(isocoat_body_get_user_data(world, b.body, &data), locked, why);
     REFUSED(isocoat_body_get_links(world, b.body, NULL, 0, &count), locked, why);
     REFUSED(isocoat_body_evaluate_field(world, b.body, v, 1, &value, NULL), locked, why);

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <cstring>
 #include <stdexcept>
+#include <thread>
 #include <type_traits>
 
 static int failures = 0;
@@ -223,6 +224,44 @@ static void snapshots()
     }
 }
 
+/* A ball that falls on another, with three threads' help and without. */
+static void threads_help()
+{
+    isocoat::world alone = falling_world(), helped = falling_world();
+    int started = 0;
+    helped.set_tasks(
+        3,
+        [&started](isocoat_task_fn run, void *task) -> void * {
+            ++started;
+            return new std::thread(run, task);
+        },
+        [](void *handle) {
+            std::thread *thread = static_cast<std::thread *>(handle);
+            thread->join();
+            delete thread;
+        });
+    for (int tick = 0; tick < 20; ++tick) {
+        alone.step(0.01);
+        helped.step(0.01);
+    }
+    CHECK(started == 40);
+    const isocoat::link_state a = alone.bodies()[1].links()[0].state(), b = helped.bodies()[1].links()[0].state();
+    CHECK(std::memcmp(&a, &b, sizeof a) == 0);
+
+    helped.set_tasks(2, [](isocoat_task_fn, void *) -> void * { throw std::runtime_error("from the host"); },
+                     [](void *) {});
+    try {
+        helped.step(0.01);
+        CHECK(false);
+    } catch (const std::runtime_error &error) {
+        CHECK(std::strcmp(error.what(), "from the host") == 0);
+    }
+    helped.set_tasks(1, {}, {});
+    helped.step(0.01);
+    CHECK(helped.bodies()[1].is_awake() && helped.times().step == 0.0);
+    helped.bodies()[1].wake();
+}
+
 static void queries()
 {
     const isocoat::world world = falling_world();
@@ -265,6 +304,7 @@ int main()
     what_a_callback_throws_comes_out_of_the_step();
     motion();
     snapshots();
+    threads_help();
     queries();
     if (failures == 0) std::puts("wrapper: all checks hold");
     return failures == 0 ? 0 : 1;

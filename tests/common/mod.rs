@@ -2,6 +2,7 @@
 #![allow(dead_code)]
 
 pub mod oracle;
+pub mod pool;
 
 use isocoat::base::Kind;
 use isocoat::field::Shape;
