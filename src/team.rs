@@ -5,11 +5,11 @@
 //! afterwards in the order of the places: so nobody's speed, number or absence can change a bit.
 
 use std::any::Any;
+use std::cell::Cell;
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicPtr, AtomicU64, AtomicUsize, Ordering};
-use std::thread::ThreadId;
 
 /// Most workers of a world.
 pub const MOST_WORKERS: usize = 64;
@@ -48,7 +48,7 @@ const PATIENCE: u32 = 10_000;
 /// Who works at a step.
 pub struct Team {
     helpers: usize,
-    main: ThreadId,
+    main: usize,
     /// A job is being done; what is asked for meanwhile, its asker does alone.
     busy: AtomicBool,
     /// Number of the job in the upper half; the blocks that nobody has taken, from which one and up to which one, in
@@ -74,6 +74,15 @@ struct Line<T>(T);
 /// Most blocks of a job.
 const MOST_BLOCKS: usize = u16::MAX as usize;
 
+/// What tells threads apart that live at the same time. The standard library's own id asks for memory, which a thread of
+/// the host may never give back.
+fn this_thread() -> usize {
+    thread_local! {
+        static MARK: Cell<u8> = const { Cell::new(0) };
+    }
+    MARK.with(|mark| std::ptr::from_ref(mark).addr())
+}
+
 type Caller = unsafe fn(*const (), Range<usize>);
 
 impl Team {
@@ -85,7 +94,7 @@ impl Team {
     fn new(helpers: usize) -> Self {
         Self {
             helpers,
-            main: std::thread::current().id(),
+            main: this_thread(),
             busy: AtomicBool::new(false),
             open: Line::default(),
             closure: AtomicPtr::default(),
@@ -126,7 +135,7 @@ impl Team {
     /// What a helper does, until the work of the step is done.
     fn help(&self) {
         // A host may run a task at once where it is handed over: there it would wait for itself.
-        if std::thread::current().id() == self.main {
+        if this_thread() == self.main {
             return;
         }
         let mut idle = 0;
