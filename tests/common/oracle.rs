@@ -90,10 +90,11 @@ impl Oracle {
         }
     }
 
-    /// A box that holds the overlap: no coat here reaches further than 1.45 of its thickness, not even blended in two.
+    /// A box that holds the overlap: on the surface of a blend one of its n fields at least has its share, `c/n`.
     fn overlap(&self) -> (Vec3, Vec3) {
         let bounds = |(coat, shapes): &(Coat, Vec<Shape>)| {
-            let reach = if shapes.len() > 1 { 1.45 * coat.thickness } else { coat.thickness };
+            let share = 1.0 / shapes.len() as f64;
+            let reach = coat.radius - (coat.radius - coat.thickness) * share.sqrt();
             let each = shapes.iter().map(|shape| match shape {
                 // A level floor.
                 Shape::Plane { point, .. } => (Vec3::repeat(-1e9), Vec3::new(1e9, 1e9, point.z + reach)),
@@ -102,7 +103,36 @@ impl Oracle {
             each.reduce(|(l, h), (low, high)| (l.inf(&low), h.sup(&high))).unwrap()
         };
         let ((la, ha), (lb, hb)) = (bounds(&self.a), bounds(&self.b));
-        (la.sup(&lb), ha.inf(&hb))
+        let mut bounds = (la.sup(&lb), ha.inf(&hb));
+        for _ in 0..3 {
+            bounds = self.shrunk(bounds);
+        }
+        bounds
+    }
+
+    /// A box without the layers of cells in which the two cannot overlap.
+    fn shrunk(&self, (low, high): (Vec3, Vec3)) -> (Vec3, Vec3) {
+        const CELLS: usize = 20;
+        let cell = (high - low) / CELLS as f64;
+        // Nowhere in a cell is a shape nearer than from the middle by half its diagonal.
+        let most = |(coat, shapes): &(Coat, Vec<Shape>), middle: Vec3| {
+            let nearest = |shape: &Shape| distance(shape, middle) - 0.5 * cell.norm();
+            shapes.iter().map(|shape| profile(nearest(shape), coat.thickness, coat.radius)).sum::<f64>() - 1.0
+        };
+        let (mut first, mut last) = (Vec3::repeat(CELLS as f64), Vec3::zeros());
+        for index in 0..CELLS.pow(3) {
+            let corner = Vec3::from([index % CELLS, index / CELLS % CELLS, index / CELLS.pow(2)].map(|i| i as f64));
+            let middle = low + corner.add_scalar(0.5).component_mul(&cell);
+            if most(&self.a, middle) > 0.0 && most(&self.b, middle) > 0.0 {
+                first = first.inf(&corner);
+                last = last.sup(&corner.add_scalar(1.0));
+            }
+        }
+        // Nothing overlaps: the box is as good as any.
+        if first.x > last.x {
+            return (low, high);
+        }
+        (low + first.component_mul(&cell), low + last.component_mul(&cell))
     }
 
     /// Force on b, with `n` by `n` lines along each axis.
