@@ -137,8 +137,12 @@ impl Oracle {
 
     /// Force on b, with `n` by `n` lines along each axis.
     pub fn force(&self, n: usize) -> Vec3 {
+        self.force_by(n, 24)
+    }
+
+    /// The same with so many samples on a line: between two of them a thin overlap may be missed.
+    pub fn force_by(&self, n: usize, steps: usize) -> Vec3 {
         let (low, high) = self.overlap();
-        const STEPS: usize = 24;
         let mut force = Vec3::zeros();
         for axis in 0..3 {
             let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
@@ -153,14 +157,14 @@ impl Oracle {
                         p
                     };
                     let positive = |s: f64| self.side(at(s)).0;
-                    let samples: Vec<f64> = (0..=STEPS).map(|step| positive(step as f64 / STEPS as f64)).collect();
+                    let samples: Vec<f64> = (0..=steps).map(|step| positive(step as f64 / steps as f64)).collect();
                     // Places where the sign is known, those between the samples included.
-                    let mut signs: Vec<(f64, bool)> = Vec::with_capacity(STEPS + 4);
-                    for step in 0..=STEPS {
-                        let s = step as f64 / STEPS as f64;
-                        let hidden = step > 0 && step < STEPS && samples[step] <= 0.0;
+                    let mut signs: Vec<(f64, bool)> = Vec::with_capacity(steps + 4);
+                    for step in 0..=steps {
+                        let s = step as f64 / steps as f64;
+                        let hidden = step > 0 && step < steps && samples[step] <= 0.0;
                         if hidden && samples[step] >= samples[step - 1] && samples[step] >= samples[step + 1] {
-                            let top = climb(&positive, s - 1.0 / STEPS as f64, s + 1.0 / STEPS as f64);
+                            let top = climb(&positive, s - 1.0 / steps as f64, s + 1.0 / steps as f64);
                             if positive(top) > 0.0 {
                                 if top < s {
                                     signs.extend([(top, true), (s, false)]);

@@ -83,7 +83,7 @@ fn the_whole_grid() {
     let begin = clock::cpu_seconds();
     let done = |what: &str| println!("{:6.1} s  {what}", clock::cpu_seconds() - begin);
     let schemes = query::schemes();
-    let blended = query::blended_pairs(16, 96);
+    let blended = query::blended_pairs(12, 192);
     let blended = blended.into_iter().map(|pair| {
         let costs = schemes.iter().map(|settings| pair.cost(settings)).collect();
         (pair, costs)

@@ -166,7 +166,8 @@ fn blended(
         at(touching + random.range(0.05, 0.3) * coats[0].thickness.min(coats[1].thickness))
     };
     let poses: Vec<[Pose; 2]> = (0..count).map(press).collect();
-    let force = |poses: &[Pose; 2], lines| Oracle::new((&coats[0], poses[0]), (&coats[1], poses[1])).force(lines);
+    let force =
+        |poses: &[Pose; 2], lines| Oracle::new((&coats[0], poses[0]), (&coats[1], poses[1])).force_by(lines, 96);
     // It is slow, and nobody looks at the clock.
     let forces: Vec<(Vec3, Vec3)> = std::thread::scope(|scope| {
         let each = poses.iter().map(|at| scope.spawn(|| (force(at, lines), force(at, lines / 2))));
