@@ -280,7 +280,7 @@ typedef struct isocoat_world_desc {
     /**
      * How contact forces act in time. Default ISOCOAT_RESPONSE_AUTO.
      * Advice (all of it measured in docs/trade.md): what need not bounce, implicit: a cube that lands on a floor takes
-     * a thirtieth of the time of sub-steps, never gains energy, and its path is off by 7% of its size instead of 0.6%.
+     * a thirtieth of the time of sub-steps, never gains energy, and its path is off by 7% of half its side, not 0.6%.
      */
     isocoat_response response;
     /**

@@ -54,7 +54,7 @@ pub struct isocoat_world_desc {
     pub struct_size: u32,
     /// How contact forces act in time. Default ISOCOAT_RESPONSE_AUTO.
     /// Advice (all of it measured in docs/trade.md): what need not bounce, implicit: a cube that lands on a floor takes
-    /// a thirtieth of the time of sub-steps, never gains energy, and its path is off by 7% of its size instead of 0.6%.
+    /// a thirtieth of the time of sub-steps, never gains energy, and its path is off by 7% of half its side, not 0.6%.
     pub response: isocoat_response,
     /// How contact surfaces are integrated. Default ISOCOAT_SCHEME_AUTO.
     /// Advice: leave it. A force within 1% takes 2 us between balls (polar 6, adaptive 250, seeds 450) and 22 us under a
