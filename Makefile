@@ -214,6 +214,7 @@ $(eval $(call compile_one,tools/peers/coat_spheres.cpp,$(PEERS)/coat_spheres,$$(
 
 .PHONY: peers
 peers: ## isocoat beside Bullet's soft bodies and Drake's hydroelastic contact, into docs/peers.md (takes minutes)
+	@command -v python3 >/dev/null || { echo 'python3 is missing: it runs the peers and writes the page.'; exit 1; }
 	@tools/deps.sh demo
 	@rm -f '$(PEERS)'/*
 	-@$(MAKE) $(PEERS)/bullet_clusters
