@@ -208,7 +208,7 @@ trade: ## exactness against time over all that can be set, into docs/trade.md, C
 PEERS        := $(WORK)/peers
 PEERS_PYTHON := $(TARGET)/peers/venv/bin/python
 
-$(eval $(call compile_one,tools/peers/bullet_clusters.cpp,$(PEERS)/bullet_clusters,\
+$(eval $(call compile_one,tools/peers/bullet_clusters.cpp,$(PEERS)/bullet_clusters,$\
 	$(call bullet_line,bullet),$(call bullet_libs,bullet)))
 $(eval $(call compile_one,tools/peers/coat_spheres.cpp,$(PEERS)/coat_spheres,$$(CXX) $$(CXX_FLAGS) $$(CXXFLAGS)))
 
