@@ -182,6 +182,9 @@ def main():
     if bars:
         page += "\n" + table(["", "peer", "isocoat", "ratio", "bar", ""], bars)
     page += drake_text + bullet_text
+    for text in (drake_text, bullet_text):
+        if "Not measured" in text:
+            print(text.strip())
     (ROOT / "docs/peers.md").write_text(page, encoding="utf-8")
     print("docs/peers.md is written")
 
