@@ -399,7 +399,7 @@ impl Measured {
         }
         text.push_str(
             "\nIn one pose of clover-step the four schemes agree with each other far better than with brute force, whatever \
-             the tolerance (force.csv): that worst error is the reference's.\n",
+             the tolerance (force.csv): some of the error there is the reference's.\n",
         );
     }
 
