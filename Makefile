@@ -214,6 +214,29 @@ count: ## what a scene pays for what it uses: bytes a body, instructions a step 
 workers: ## how much faster two workers are (needs two idle cores)
 	$(CARGO) test --release --test workers -- --ignored --nocapture
 
+.PHONY: trade
+trade: ## exactness against time over all that can be set, into docs/trade.md, CSV and SVG (takes minutes)
+	$(CARGO) test --release --test trade -- --ignored --nocapture
+
+# Peers are no part of the tests: what is missing is fetched if it can be, and said in the page if it cannot.
+PEERS        := $(WORK)/peers
+PEERS_PYTHON := $(TARGET)/peers/venv/bin/python
+
+$(eval $(call compile_one,tools/peers/bullet_clusters.cpp,$(PEERS)/bullet_clusters,$\
+	$(call bullet_line,bullet),$(call bullet_libs,bullet)))
+$(eval $(call compile_one,tools/peers/coat_spheres.cpp,$(PEERS)/coat_spheres,$$(CXX) $$(CXX_FLAGS) $$(CXXFLAGS)))
+
+.PHONY: peers
+peers: ## isocoat beside Bullet's soft bodies and Drake's hydroelastic contact, into docs/peers.md (takes minutes)
+	@command -v python3 >/dev/null || { echo 'python3 is missing: it runs the peers and writes the page.'; exit 1; }
+	@tools/deps.sh demo
+	@rm -f '$(PEERS)'/*
+	-@$(MAKE) $(PEERS)/bullet_clusters
+	-@$(MAKE) $(PEERS)/coat_spheres
+	-@'$(PEERS_PYTHON)' -c 'import pydrake' 2>/dev/null || { echo 'Installing: drake, with pip, under target/'; \
+		python3 -m venv '$(TARGET)/peers/venv' && '$(PEERS_PYTHON)' -m pip install --quiet drake; }
+	@python3 tools/peers/run.py '$(PEERS)' '$(PEERS_PYTHON)'
+
 .PHONY: bench
 bench: ## measure
 	$(CARGO) bench

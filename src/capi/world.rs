@@ -53,25 +53,41 @@ pub struct isocoat_world_desc {
     /// Size of this struct in bytes, as the host knows it.
     pub struct_size: u32,
     /// How contact forces act in time. Default ISOCOAT_RESPONSE_AUTO.
+    /// Advice (all of it measured in docs/trade.md): what need not bounce, implicit: a cube that lands on a floor takes
+    /// a thirtieth of the time of sub-steps, never gains energy, and its path is off by 7% of half its side, not 0.6%.
     pub response: isocoat_response,
     /// How contact surfaces are integrated. Default ISOCOAT_SCHEME_AUTO.
+    /// Advice: leave it. A force within 1% takes 2 us between balls (polar 6, adaptive 250, seeds 450) and 22 us under a
+    /// cube (polar 360, adaptive 840).
     pub scheme: isocoat_scheme,
     /// Seeds of a skeleton that does not say its own number: from 4 to 65536. Default 64.
+    /// Advice: it matters for ISOCOAT_SCHEME_SEEDS, and where a surface wraps round. Two balls' force is off by 36% with
+    /// 256, 3% with 1024, 0.3% with 4096; the time goes with the number.
     pub seed_count: u32,
     /// Upper bound of the sub-steps in one step: from 1 to 65536. Default 4096.
+    /// Advice: a bound for the worst case, not for speed. Where more are wanted, ISOCOAT_RESPONSE_AUTO turns implicit:
+    /// with 16 instead of 64 two balls at 60 Hz no longer bounce.
     pub max_substeps: u32,
     /// Acceleration of gravity, in m/s^2, finite. Default 0.
     pub gravity: [f64; 3],
     /// Relative error accepted in a contact force: from 1e-9 to 0.5. Default 5e-3.
+    /// Advice: 5e-2 saves a quarter of the time of blended coats or faces, and takes the path of two dumbbells from 0.2%
+    /// off to 2%; 5e-4 takes twice the time, to 0.04%. Between balls it changes nothing: their closed form is exact.
     pub force_tolerance: f64,
     /// Largest product of contact frequency and sub-step, in rad: from 0.01 to 1. Default 0.2.
+    /// Advice: half of it takes up to twice the time for about a third of the error: the path of a ball that bounces is
+    /// off by 5% of the radius at 0.4, 0.9% at 0.2, 0.3% at 0.1; 1 still does for a cube that lands, at 2%.
     pub substep_phase: f64,
     /// Implicit response: motion of a contact between two rounds, over its depth, that ends them: from 1e-9 to 1.
     /// Default 0.05.
+    /// Advice: leave it. From 0.5 to 5e-4 ten balls in a box take 15% more time, and their path and rest stay the same.
     pub implicit_tolerance: f64,
     /// Implicit response: most evaluations of a contact surface before the step is split: from 1 to 64. Default 8.
+    /// Advice: 4 or more. With 2, steps are split instead and ten balls in a box take half as long again; with 1, ten
+    /// times as long or more.
     pub implicit_rounds: u32,
     /// Implicit response: how often a step that does not converge may be split in two: from 0 to 10. Default 4.
+    /// Advice: leave it. It costs nothing where steps converge, as in all five scenes of docs/trade.md.
     pub implicit_splits: u32,
     /// Time for which a group of bodies must be at rest before it falls asleep, in s: at least 0; 0 is never. Default 0.
     pub sleep_time: f64,
@@ -244,7 +260,8 @@ pub unsafe extern "C" fn isocoat_world_destroy(world: *mut isocoat_world) -> iso
 }
 
 /// Advances a world: contacts, forces, and the motion of the links that the library integrates. Voids the views of the
-/// step before.
+/// step before. Advice: sub-steps choose their own length; the implicit response's errors go with dt: a rolling ball's
+/// path is off by 6% of its radius at 1/60 s, by 1.6% at 1/240 s (docs/trade.md).
 ///
 /// - world: not NULL.
 /// - dt: length of the step, in s, > 0 and at most 10.

@@ -90,10 +90,11 @@ impl Oracle {
         }
     }
 
-    /// A box that holds the overlap: no coat here reaches further than 1.45 of its thickness, not even blended in two.
+    /// A box that holds the overlap: on the surface of a blend one of its n fields at least has its share, `c/n`.
     fn overlap(&self) -> (Vec3, Vec3) {
         let bounds = |(coat, shapes): &(Coat, Vec<Shape>)| {
-            let reach = if shapes.len() > 1 { 1.45 * coat.thickness } else { coat.thickness };
+            let share = 1.0 / shapes.len() as f64;
+            let reach = coat.radius - (coat.radius - coat.thickness) * share.sqrt();
             let each = shapes.iter().map(|shape| match shape {
                 // A level floor.
                 Shape::Plane { point, .. } => (Vec3::repeat(-1e9), Vec3::new(1e9, 1e9, point.z + reach)),
@@ -102,13 +103,46 @@ impl Oracle {
             each.reduce(|(l, h), (low, high)| (l.inf(&low), h.sup(&high))).unwrap()
         };
         let ((la, ha), (lb, hb)) = (bounds(&self.a), bounds(&self.b));
-        (la.sup(&lb), ha.inf(&hb))
+        let mut bounds = (la.sup(&lb), ha.inf(&hb));
+        for _ in 0..3 {
+            bounds = self.shrunk(bounds);
+        }
+        bounds
+    }
+
+    /// A box without the layers of cells in which the two cannot overlap.
+    fn shrunk(&self, (low, high): (Vec3, Vec3)) -> (Vec3, Vec3) {
+        const CELLS: usize = 20;
+        let cell = (high - low) / CELLS as f64;
+        // Nowhere in a cell is a shape nearer than from the middle by half its diagonal.
+        let most = |(coat, shapes): &(Coat, Vec<Shape>), middle: Vec3| {
+            let nearest = |shape: &Shape| distance(shape, middle) - 0.5 * cell.norm();
+            shapes.iter().map(|shape| profile(nearest(shape), coat.thickness, coat.radius)).sum::<f64>() - 1.0
+        };
+        let (mut first, mut last) = (Vec3::repeat(CELLS as f64), Vec3::zeros());
+        for index in 0..CELLS.pow(3) {
+            let corner = Vec3::from([index % CELLS, index / CELLS % CELLS, index / CELLS.pow(2)].map(|i| i as f64));
+            let middle = low + corner.add_scalar(0.5).component_mul(&cell);
+            if most(&self.a, middle) > 0.0 && most(&self.b, middle) > 0.0 {
+                first = first.inf(&corner);
+                last = last.sup(&corner.add_scalar(1.0));
+            }
+        }
+        // Nothing overlaps: the box is as good as any.
+        if first.x > last.x {
+            return (low, high);
+        }
+        (low + first.component_mul(&cell), low + last.component_mul(&cell))
     }
 
     /// Force on b, with `n` by `n` lines along each axis.
     pub fn force(&self, n: usize) -> Vec3 {
+        self.force_by(n, 72)
+    }
+
+    /// The same with so many samples on a line: between two of them a thin overlap may be missed.
+    pub fn force_by(&self, n: usize, steps: usize) -> Vec3 {
         let (low, high) = self.overlap();
-        const STEPS: usize = 72;
         let mut force = Vec3::zeros();
         for axis in 0..3 {
             let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
@@ -123,14 +157,14 @@ impl Oracle {
                         p
                     };
                     let positive = |s: f64| self.side(at(s)).0;
-                    let samples: Vec<f64> = (0..=STEPS).map(|step| positive(step as f64 / STEPS as f64)).collect();
+                    let samples: Vec<f64> = (0..=steps).map(|step| positive(step as f64 / steps as f64)).collect();
                     // Places where the sign is known, those between the samples included.
-                    let mut signs: Vec<(f64, bool)> = Vec::with_capacity(STEPS + 4);
-                    for step in 0..=STEPS {
-                        let s = step as f64 / STEPS as f64;
-                        let hidden = step > 0 && step < STEPS && samples[step] <= 0.0;
+                    let mut signs: Vec<(f64, bool)> = Vec::with_capacity(steps + 4);
+                    for step in 0..=steps {
+                        let s = step as f64 / steps as f64;
+                        let hidden = step > 0 && step < steps && samples[step] <= 0.0;
                         if hidden && samples[step] >= samples[step - 1] && samples[step] >= samples[step + 1] {
-                            let top = climb(&positive, s - 1.0 / STEPS as f64, s + 1.0 / STEPS as f64);
+                            let top = climb(&positive, s - 1.0 / steps as f64, s + 1.0 / steps as f64);
                             if positive(top) > 0.0 {
                                 if top < s {
                                     signs.extend([(top, true), (s, false)]);
