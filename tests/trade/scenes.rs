@@ -60,6 +60,7 @@ impl Settings {
             implicit_rounds: self.rounds,
             implicit_tolerance: self.round_tolerance,
             implicit_splits: self.splits,
+            ..WorldDesc::default()
         })
         .unwrap()
     }
