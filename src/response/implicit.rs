@@ -289,7 +289,11 @@ impl Solver {
         self.x.clear();
         self.x.resize(self.order.len() * BLOCK, 0.0);
         for (block, link) in self.order.iter().enumerate() {
-            put_twist(&mut self.x, block as u32, &self.trial[*link as usize].twist);
+            let (now, guess) = (&motions[*link as usize].twist, &self.trial[*link as usize].twist);
+            let free = twist_of(&self.free, block as u32);
+            // Where contacts hold a link nearly as it is, it will be held as it is: what the sweeps left is no motion.
+            let held = (guess.linear - now.linear).norm() < 0.5 * (free.linear - now.linear).norm();
+            put_twist(&mut self.x, block as u32, if held { now } else { guess });
         }
     }
 

@@ -30,6 +30,10 @@ pub(crate) struct Stepping {
     pub(super) bounds: Vec<Bounds>,
     pub(super) bounds_of: Vec<usize>,
     pub(super) pairs: Vec<[u32; 2]>,
+    /// Bounds of the last step, body by body, and the pairs that meet among them: while nobody moves, nobody else meets.
+    last_bounds: Vec<Bounds>,
+    new_bounds: Vec<Bounds>,
+    met: Vec<[u32; 2]>,
     /// In the order of their bodies.
     pub(super) candidates: Vec<Candidate>,
     /// Those of the last step, then their memory for reuse.
@@ -123,6 +127,9 @@ impl Stepping {
             bounds: _,
             bounds_of: _,
             pairs: _,
+            last_bounds: _,
+            new_bounds: _,
+            met: _,
             previous: _,
             spare: _,
             islands: _,
@@ -240,13 +247,18 @@ impl World {
 
     /// Pairs of bodies whose bounds meet and that may touch.
     fn find_candidates(&mut self, state: &mut Stepping, dt: f64, team: &Team) {
-        state.bounds.clear();
+        state.new_bounds.clear();
         for index in self.bodies.indices() {
             if self.bodies[index].enabled {
-                state.bounds.extend(self.bounds_of(index, &state.motions, dt));
+                state.new_bounds.extend(self.bounds_of(index, &state.motions, dt));
             }
         }
-        broad_phase::pairs(&mut state.bounds, &mut state.pairs);
+        if state.new_bounds != state.last_bounds {
+            state.bounds.clone_from(&state.new_bounds);
+            broad_phase::pairs(&mut state.bounds, &mut state.met);
+            std::mem::swap(&mut state.new_bounds, &mut state.last_bounds);
+        }
+        state.pairs.clone_from(&state.met);
         state.bounds_of.clear();
         state.bounds_of.resize(self.bodies.capacity(), usize::MAX);
         for (position, bounds) in state.bounds.iter().enumerate() {
