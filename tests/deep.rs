@@ -5,7 +5,7 @@ mod common;
 use common::{Coat, Random, box_inertia, collide, total};
 use isocoat::base::Kind;
 use isocoat::field::Shape;
-use isocoat::math::{Mat3, Pose, Twist, Vec3};
+use isocoat::math::{Mat3, Pose, Quat, Twist, Vec3};
 use isocoat::world::{EventKind, LinkDesc, LinkId, LinkState, Response, Scheme, World, WorldDesc};
 
 const THICKNESS: f64 = 0.05;
@@ -235,5 +235,24 @@ fn a_ball_pressed_onto_a_hard_capsule_past_its_middle_still_feels_it() {
             assert!(pressed > 0.0, "{scheme:?} {tolerance:.0e} at {height}: no force");
             assert!((pressed - polar).abs() <= estimate * polar.max(pressed) + 0.02 * polar);
         }
+    }
+}
+
+#[test]
+fn blends_pressed_deep_into_each_other_agree_with_brute_force() {
+    let points = [Shape::Point(Vec3::x() * -0.12), Shape::Point(Vec3::x() * 0.12)];
+    let (a, b) = (Coat::new(&points, 0.1), Coat::new(&points, 0.1).stiff(3e5));
+    let turn = |x, y, z, w| Quat::from_quaternion(nalgebra::Quaternion::new(w, x, y, z));
+    // Where the surface leans over, and where two deepest points lie in one patch.
+    for (position, rotation) in [
+        (Vec3::new(0.0526, -0.0170, -0.1360), turn(0.4147, -0.8775, 0.1943, 0.1419)),
+        (Vec3::new(0.0502, -0.1263, 0.0076), turn(0.0057, -0.5929, 0.0360, 0.8044)),
+    ] {
+        let (a, b) = ((&a, Pose::default()), (&b, Pose { position, rotation }));
+        let exact = common::oracle::Oracle::new(a, b).force(80);
+        let contacts = collide(a, b, Scheme::Auto, 5e-3);
+        let error = (total(&contacts) - exact).norm() / exact.norm();
+        println!("{:.1} N, off by {error:.1e}, by {:?}", exact.norm(), contacts[0].scheme);
+        assert!(error < 5e-3);
     }
 }

@@ -18,7 +18,7 @@ use super::deepest::{Deepest, approach};
 use super::pair::{Pair, Side};
 use super::patch::Node;
 use super::surface::Surface;
-use crate::coat::seeds::{Ray, plane_rays};
+use crate::coat::seeds::{Ray, plane_rays, rays};
 use crate::coat::territory;
 use crate::field::Shape;
 use crate::math::Vec3;
@@ -56,8 +56,11 @@ impl Tally {
     }
 }
 
-/// Integrates all of a pair's contact with the seeds of both coats.
-pub fn integrate(pair: &Pair, out: &mut Surface) {
+/// Least rays of a skeleton where seeds stand in for a scheme that a tolerance was asked of.
+pub const STAND_IN: usize = 1024;
+
+/// Integrates all of a pair's contact with the seeds of both coats, at `least` so many a skeleton.
+pub fn integrate(pair: &Pair, least: usize, out: &mut Surface) {
     if out.maxima().is_empty() {
         return;
     }
@@ -69,7 +72,7 @@ pub fn integrate(pair: &Pair, out: &mut Surface) {
         if own.rigid {
             continue;
         }
-        let mut lattice = Vec::new();
+        let mut made = std::mem::take(&mut out.rays);
         for index in 0..own.skeletons.len() {
             let shape = own.skeletons[index].shape;
             // Where the partner's coat reaches a skeleton, its rays may start on the partner's side.
@@ -79,9 +82,13 @@ pub fn integrate(pair: &Pair, out: &mut Surface) {
             });
             let rays: &[Ray] = if let Shape::Plane { point, normal } = &shape {
                 let (low, high) = finite_bounds(other);
-                lattice.clear();
-                plane_rays(point, normal, spacing(other), &low, &high, &mut lattice);
-                &lattice
+                made.clear();
+                plane_rays(point, normal, spacing(other, least), &low, &high, &mut made);
+                &made
+            } else if own.rays[index].len() < least {
+                made.clear();
+                rays(&own.locals[index], own.skeletons[index].profile.thickness, least, &mut made);
+                &made
             } else {
                 &own.rays[index]
             };
@@ -91,6 +98,7 @@ pub fn integrate(pair: &Pair, out: &mut Surface) {
                 cast(pair, from_a, index, reached, &ray, &mut out.nodes, &mut tally);
             }
         }
+        out.rays = made;
     }
     share_out(pair, first, &tally, out);
 }
@@ -218,12 +226,12 @@ fn finite_bounds(side: &Side) -> (Vec3, Vec3) {
 }
 
 /// Distance between the seeds of a side on its surface: what a plane's lattice takes over.
-fn spacing(side: &Side) -> f64 {
+fn spacing(side: &Side, least: usize) -> f64 {
     let (mut area, mut count) = (0.0, 0usize);
     for (skeleton, rays) in side.skeletons.iter().zip(&side.rays) {
         let t = skeleton.profile.thickness;
         area += rays.iter().map(|ray| ray.weight * t.powi(i32::from(ray.power))).sum::<f64>();
-        count += rays.len();
+        count += rays.len().max(least);
     }
     (area / count.max(1) as f64).sqrt()
 }

@@ -9,6 +9,7 @@ use super::overload::is_overloaded;
 use super::pair::{Pair, Side};
 use super::patch::{self, Node, Patch};
 use super::{adaptive, facets, polar, seeds};
+use crate::coat::seeds::Ray;
 use crate::field::Shape;
 use crate::math::Vec3;
 
@@ -39,6 +40,8 @@ pub struct Surface {
     outlines: Vec<(f64, f64)>,
     workspace: adaptive::Workspace,
     polar: polar::Workspace,
+    /// Rays that the seeds made for one use.
+    pub(super) rays: Vec<Ray>,
     pieces: facets::Workspace,
 }
 
@@ -113,7 +116,7 @@ fn find_patches(pair: &Pair, settings: &Settings, out: &mut Surface) -> Option<(
     // The deepest first; equal ones stay in the order of the skeletons.
     out.maxima.sort_by(|x, y| y.sum.total_cmp(&x.sum));
     if settings.scheme == Scheme::Seeds {
-        seeds::integrate(pair, out);
+        seeds::integrate(pair, 0, out);
         return most.1;
     }
     let extent = extent(&pair.a).min(extent(&pair.b));
@@ -126,7 +129,7 @@ fn find_patches(pair: &Pair, settings: &Settings, out: &mut Surface) -> Option<(
             // The surface wraps round: no plane sees all of it, the seeds do.
             out.patches.clear();
             out.nodes.clear();
-            seeds::integrate(pair, out);
+            seeds::integrate(pair, seeds::STAND_IN, out);
             return most.1;
         }
     }
