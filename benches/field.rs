@@ -5,7 +5,7 @@
 
 use divan::{Bencher, black_box, counter::ItemsCount};
 use isocoat::field::lanes::Dispatch;
-use isocoat::field::{Placed, Profile, Shape, blend};
+use isocoat::field::{Graph, Placed, Profile, Shape, blend};
 use isocoat::math::{Vec3, rotation_from_vector};
 
 fn main() {
@@ -59,7 +59,7 @@ fn scalar(bencher: Bencher, shape: &str) {
     bencher.counter(items()).bench_local(|| {
         let outputs = values.iter_mut().zip(&mut gradients);
         for (point, (value, gradient)) in black_box(&points).iter().zip(outputs) {
-            let sum = blend::value_gradient(&skeletons, &Vec3::from(*point));
+            let sum = blend::value_gradient(&skeletons, &Graph::default(), &Vec3::from(*point));
             (*value, *gradient) = (sum.0, sum.1.into());
         }
         black_box((&mut values, &mut gradients));

@@ -557,6 +557,15 @@ typedef struct isocoat_body_desc {
     uint32_t may_sleep;
     /** 0. */
     uint32_t reserved;
+    /**
+     * Width of the band in which the fields of groups that don't blend go over into each other, over the isovalue, from
+     * 0 to 0.5; 0 leaves a crease. Only for bodies with a blend graph. Default 0.05.
+     */
+    double blend_band;
+    /** 1 if its parts that don't blend collide, when they are of different links, else 0. Default 1. */
+    uint32_t self_contact;
+    /** 0. */
+    uint32_t reserved_2;
 } isocoat_body_desc;
 
 /**
@@ -1099,6 +1108,86 @@ ISOCOAT_MUST_USE
 isocoat_status isocoat_skeleton_get_link(const isocoat_world *world,
                                          isocoat_skeleton skeleton,
                                          isocoat_link *link);
+
+/* ---- Blend graphs ------------------------------------------------------------------------------------------------ */
+
+/**
+ * Sets how much two skeletons of a body blend: 1 adds their fields, with 0 the larger counts. New bodies blend all
+ * over. Skeletons of different links collide, as far as they don't blend, if isocoat_body_desc::self_contact is 1; but
+ * not in the territory of a third that blends with both.
+ *
+ * - world: not NULL.
+ * - a, b: two skeletons of one body.
+ * - weight: from 0 to 1.
+ * - duration: time that the change takes, in s; 0 for at once.
+ *
+ * Errors: INVALID_HANDLE, OUT_OF_RANGE, UNSUPPORTED (skeletons of two bodies; the same skeleton; a graph with more than
+ * 4096 groups of skeletons that all blend). Threads: changes the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_skeleton_set_blend(isocoat_world *world,
+                                          isocoat_skeleton a,
+                                          isocoat_skeleton b,
+                                          double weight,
+                                          double duration);
+
+/**
+ * How much two skeletons of a body blend now.
+ *
+ * - world: not NULL.
+ * - a, b: two skeletons of one body.
+ * - weight: receives the weight, from 0 to 1; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, UNSUPPORTED. Threads: reads the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_skeleton_get_blend(const isocoat_world *world,
+                                          isocoat_skeleton a,
+                                          isocoat_skeleton b,
+                                          double *weight);
+
+/**
+ * Lets exactly those skeletons of a body blend that are of the same link, or of two links that are joined; also those
+ * created later. Weights set before are forgotten.
+ *
+ * - world: not NULL.
+ * - body: the body.
+ * - joints: 2 handles a joint, links of the body; not NULL unless count is 0.
+ * - count: number of joints.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, UNSUPPORTED (a link of another body; a link joined to itself; a graph with
+ * more than 4096 groups of skeletons that all blend). Threads: changes the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_body_blend_neighbours(isocoat_world *world,
+                                             isocoat_body body,
+                                             const isocoat_link *joints,
+                                             size_t count);
+
+/**
+ * Lets all skeletons of a body blend, as in the beginning.
+ *
+ * - world: not NULL.
+ * - body: the body.
+ *
+ * Errors: INVALID_HANDLE. Threads: changes the world.
+ */
+ISOCOAT_MUST_USE isocoat_status isocoat_body_blend_all(isocoat_world *world, isocoat_body body);
+
+/**
+ * Says whether two skeletons of a body may collide where they don't blend; they may, unless told otherwise.
+ *
+ * - world: not NULL.
+ * - a, b: two skeletons of one body.
+ * - enabled: whether they may collide.
+ *
+ * Errors: INVALID_HANDLE, UNSUPPORTED. Threads: changes the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_skeleton_set_pair_contact(isocoat_world *world,
+                                                 isocoat_skeleton a,
+                                                 isocoat_skeleton b,
+                                                 bool enabled);
 
 /* ---- Motion of one link ------------------------------------------------------------------------------------------ */
 

@@ -177,6 +177,20 @@ public:
     void *user_data() const { return detail::read<void *>(nullptr, isocoat_skeleton_get_user_data, world_, raw_); }
     /* The link that carries it. */
     link parent() const;
+    /* How much it blends with another skeleton of its body. */
+    double blend(const skeleton &other) const
+    {
+        return detail::read(0.0, isocoat_skeleton_get_blend, world_, raw_, other.raw_);
+    }
+    void set_blend(const skeleton &other, double weight, double duration = 0.0)
+    {
+        check(isocoat_skeleton_set_blend(world_, raw_, other.raw_, weight, duration));
+    }
+    /* Whether it may collide with another skeleton of its body. */
+    void set_pair_contact(const skeleton &other, bool enabled)
+    {
+        check(isocoat_skeleton_set_pair_contact(world_, raw_, other.raw_, enabled));
+    }
     seed_list seeds() const
     {
         std::size_t count = 0;
@@ -283,6 +297,18 @@ public:
             return isocoat_body_get_links(world_, raw_, list...);
         }));
     }
+
+    /* Lets exactly those skeletons blend that are of the same link, or of two links that are joined. */
+    void blend_neighbours(span<const std::pair<link, link>> joints)
+    {
+        std::vector<isocoat_link> raw;
+        for (const auto &joint : joints) {
+            raw.push_back(joint.first.raw());
+            raw.push_back(joint.second.raw());
+        }
+        check(isocoat_body_blend_neighbours(world_, raw_, raw.data(), joints.size()));
+    }
+    void blend_all() { check(isocoat_body_blend_all(world_, raw_)); }
 
     /* The field at many points; values and gradients are as long as points, or empty when not wanted. */
     void evaluate_field(span<const vec3> points, span<double> values, span<vec3> gradients = {}) const

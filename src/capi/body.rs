@@ -75,6 +75,13 @@ pub struct isocoat_body_desc {
     pub may_sleep: u32,
     /// 0.
     pub reserved: u32,
+    /// Width of the band in which the fields of groups that don't blend go over into each other, over the isovalue, from
+    /// 0 to 0.5; 0 leaves a crease. Only for bodies with a blend graph. Default 0.05.
+    pub blend_band: f64,
+    /// 1 if its parts that don't blend collide, when they are of different links, else 0. Default 1.
+    pub self_contact: u32,
+    /// 0.
+    pub reserved_2: u32,
 }
 
 // SAFETY: `repr(C)`, the size first, numbers and a pointer that is never followed.
@@ -120,6 +127,9 @@ impl From<&BodyDesc> for isocoat_body_desc {
             damping_ratio,
             may_sleep: desc.may_sleep.into(),
             reserved: 0,
+            blend_band: desc.blend_band,
+            self_contact: desc.self_contact.into(),
+            reserved_2: 0,
         }
     }
 }
@@ -127,6 +137,7 @@ impl From<&BodyDesc> for isocoat_body_desc {
 impl isocoat_body_desc {
     fn to_rust(self) -> Checked<BodyDesc> {
         check_reserved(self.reserved)?;
+        check_reserved(self.reserved_2)?;
         Ok(BodyDesc {
             rigid: match self.kind {
                 ISOCOAT_BODY_DEFORMABLE => false,
@@ -151,6 +162,8 @@ impl isocoat_body_desc {
             mask: self.mask,
             user_data: self.user_data as usize,
             response: response_from_c(self.response)?,
+            blend_band: self.blend_band,
+            self_contact: flag("self_contact", self.self_contact)?,
             may_sleep: flag("may_sleep", self.may_sleep)?,
         })
     }

@@ -2,7 +2,7 @@
 //!
 //! Mechanism and nouns are apart. Mechanism: [`status`] (codes, messages), [`version`], [`guard`] (panics, locks),
 //! [`mod@pointer`] and [`descriptor`] (memory of the host), [`handle`], [`buffer`]. Nouns: [`world`], [`body`],
-//! [`link`], [`skeleton`], [`math`], and what is done with them: [`motion`], [`bulk`], [`report`], [`snapshot`], [`query`],
+//! [`link`], [`skeleton`], [`blend`], [`math`], and what is done with them: [`motion`], [`bulk`], [`report`], [`snapshot`], [`query`],
 //! [`draw`], [`tasks`].
 //!
 //! Nothing here computes: every function checks the host's pointers, translates, calls the public Rust API, and
@@ -11,6 +11,7 @@
 // The names and the promises are those of C. What a pointer must be stands in the line of its parameter.
 #![allow(non_camel_case_types, clippy::missing_safety_doc)]
 
+pub mod blend;
 pub mod body;
 pub mod buffer;
 pub mod bulk;

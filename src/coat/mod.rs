@@ -1,16 +1,19 @@
 //! The coat: the implicit layer of one body, in one frame.
 //!
+//! [`cliques`] turns who blends with whom into groups of skeletons that add up, and pairs of groups that collide.
 //! [`seeds`] sends fixed rays from each skeleton; [`territory`] follows them to the coat's surface or to the border of
 //! another skeleton's territory.
 
+pub mod cliques;
 pub mod root;
 pub mod seeds;
 pub mod territory;
 
-use crate::field::{Placed, Profile, Shape, blend};
+use crate::field::{Graph, Placed, Profile, Shape, blend};
 use crate::math::{Pose, Vec3};
 
-/// The skeletons of one body and the isovalue of its surface: the solid is where their field is at least the isovalue.
+/// The skeletons of one body, how they blend, and the isovalue of the surface: the solid is where the field is at least
+/// the isovalue.
 ///
 /// Everything is in a frame with the world's axes whose origin the caller chooses near the body, so that a body keeps
 /// its digits however far it is from the origin of the world.
@@ -22,12 +25,14 @@ pub struct Coat {
     pub isovalue: f64,
     /// The skeletons, in the frame.
     pub skeletons: Vec<Placed>,
+    /// How their fields go together.
+    pub graph: Graph,
 }
 
 impl Coat {
     /// A coat without skeletons.
     pub fn new(origin: Vec3, isovalue: f64) -> Self {
-        Self { origin, isovalue, skeletons: Vec::new() }
+        Self { origin, isovalue, ..Self::default() }
     }
 
     /// Adds a skeleton of a link: `shape` in the link's frame, `pose` of the link in the world.
@@ -40,20 +45,28 @@ impl Coat {
         Pose { position: pose.position - self.origin, rotation: pose.rotation }
     }
 
+    /// The coat of some of the skeletons, by their positions.
+    pub fn subset(&self, positions: &[u32]) -> Coat {
+        let mut graph = Graph::default();
+        self.graph.restrict(positions, &mut graph);
+        let skeletons = positions.iter().map(|position| self.skeletons[*position as usize]).collect();
+        Coat { skeletons, graph, ..*self }
+    }
+
     /// How far the field is above the isovalue at a point of the frame: not negative inside the solid.
     pub fn excess(&self, p: &Vec3) -> f64 {
-        self.skeletons.iter().map(|skeleton| skeleton.value(p)).sum::<f64>() - self.isovalue
+        blend::value(&self.skeletons, &self.graph, p) - self.isovalue
     }
 
     /// The excess and the field's gradient at a point of the frame.
     pub fn excess_gradient(&self, p: &Vec3) -> (f64, Vec3) {
-        let (value, gradient) = blend::value_gradient(&self.skeletons, p);
+        let (value, gradient) = blend::value_gradient(&self.skeletons, &self.graph, p);
         (value - self.isovalue, gradient)
     }
 
     /// Outward unit normal of the level surface through a point of the frame; `fallback` where the field is flat.
     pub fn normal(&self, p: &Vec3, fallback: &Vec3) -> Vec3 {
-        (-blend::value_gradient(&self.skeletons, p).1).try_normalize(0.0).unwrap_or(*fallback)
+        (-blend::value_gradient(&self.skeletons, &self.graph, p).1).try_normalize(0.0).unwrap_or(*fallback)
     }
 
     /// Axis-aligned bounds of the field in the frame, as (low, high): outside it is zero. Infinite with a plane, empty

@@ -12,7 +12,7 @@
 use super::Coat;
 use super::root::bracketed;
 use super::seeds::Ray;
-use crate::field::Placed;
+use crate::field::{Placed, blend};
 use crate::math::Vec3;
 
 /// What a seed ran into.
@@ -131,15 +131,15 @@ struct View {
 impl View {
     fn at(coat: &Coat, index: usize, neighbours: &[usize], p: &Vec3) -> Self {
         let own = coat.skeletons[index].value(p);
-        let (mut sum, mut lead, mut rival) = (own, f64::INFINITY, index);
-        for &other in neighbours {
-            let value = coat.skeletons[other].value(p);
-            sum += value;
-            let ahead = ahead_of(own, value, index, other, coat.isovalue);
+        let (mut lead, mut rival) = (f64::INFINITY, index);
+        let others = neighbours.iter().map(|other| (*other, coat.skeletons[*other].value(p)));
+        let compared = others.inspect(|(other, value)| {
+            let ahead = ahead_of(own, *value, index, *other, coat.isovalue);
             if ahead < lead {
-                (lead, rival) = (ahead, other);
+                (lead, rival) = (ahead, *other);
             }
-        }
+        });
+        let sum = blend::together(&coat.graph, std::iter::once((index, own)).chain(compared));
         Self { excess: sum - coat.isovalue, lead, rival }
     }
 }

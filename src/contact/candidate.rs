@@ -1,4 +1,5 @@
-//! A candidate: two bodies that may touch in this step, and what is remembered of them from the last.
+//! A candidate: two bodies, or two parts of one, that may touch in this step, and what is remembered of them from the
+//! last.
 //!
 //! While two bodies hardly move against each other from one sub-step to the next, their contact surface is not
 //! integrated anew: each node's pressure follows the motion by its stiffness, `p + g n·Δ`. The force is then off by the
@@ -17,11 +18,13 @@ use crate::math::{Quat, Vec3, rotation_to_vector};
 /// Motion of the nodes over the depth of the contact, over the root of the tolerance, up to which the surface is kept.
 const KEEP: f64 = 0.1;
 
-/// Two bodies whose bounds meet.
+/// Two bodies, or parts of one, whose bounds meet.
 #[derive(Debug, Default)]
 pub struct Candidate {
-    /// Slots of the bodies, the smaller first.
+    /// Slots of the bodies, the smaller first; the same twice for parts of one.
     pub bodies: [u32; 2],
+    /// Of parts of one body, which of its pairs of groups.
+    pub block: u32,
     /// The link whose centre of mass is the origin of the pair's frame.
     pub lead: u32,
     /// Their coats.
@@ -65,6 +68,7 @@ impl Candidate {
     pub fn lasting(&self) -> &Memory {
         let Self {
             bodies: _,
+            block: _,
             lead: _,
             close: _,
             pair: _,
@@ -77,6 +81,11 @@ impl Candidate {
             memory,
         } = self;
         memory
+    }
+
+    /// The order of candidates: slots of the bodies, then the part.
+    pub fn key(&self) -> ([u32; 2], [u32; 2]) {
+        (self.bodies, self.memory.part)
     }
 
     /// Brings the contact surface up to the present poses, by a fresh integration when `fresh` or when the bodies have
@@ -92,8 +101,11 @@ impl Candidate {
         self.reference = self.placements(motions);
     }
 
-    /// Where the two links are, when there is one a side.
+    /// Where the two links are, when there is one a side, and nothing between them.
     fn placements(&self, motions: &[Motion]) -> Option<[Placement; 2]> {
+        if !self.pair.covers.is_empty() {
+            return None;
+        }
         let origin = motions[self.lead as usize].center;
         let place = |link: u32| {
             let motion = &motions[link as usize];
@@ -145,6 +157,8 @@ impl Candidate {
 pub struct Memory {
     /// The bodies' handles, for the event that ends the contact.
     pub ids: [RawId; 2],
+    /// Of parts of one body, the slots of the first skeletons of both; zeros for two bodies.
+    pub part: [u32; 2],
     /// They touched at the end of the last step.
     pub touching: bool,
     /// They touched at some time in this step.
@@ -160,6 +174,11 @@ pub struct Memory {
 }
 
 impl Memory {
+    /// The order of memories: slots of the bodies, then the part.
+    pub fn key(&self) -> ([u32; 2], [u32; 2]) {
+        (self.ids.map(|id| id.index), self.part)
+    }
+
     /// Forgets what the contact went through, but not that it is one.
     pub fn forget_history(&mut self) {
         self.rate2 = 0.0;

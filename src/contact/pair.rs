@@ -5,12 +5,15 @@
 //! - the difference `Φ = w_a α - w_b β` is zero, `w_a = K_a / (K_a + K_b)`, `w_b = 1 - w_a` (rigid b: 0 and 1), and
 //! - the sum `σ = α + β` is positive, which ends at the border of the contact.
 //!
+//! Parts of one body that don't blend meet in the same way, but for a neighbour that both blend with: within its
+//! territory there is no contact of the two, so from `α` and `β` is taken what it rises above the isovalue, a [`Cover`].
+//!
 //! On that surface the pressure is `p = K σ` with `1/K = 1/K_a + 1/K_b`: one formula for every ratio of stiffness and
 //! for rigid bodies, without the cancellation of `K_a α` (docs/model.md, "Contact surface").
 
 use crate::base::Motion;
 use crate::coat::seeds::Ray;
-use crate::field::{Placed, Shape, blend};
+use crate::field::{Graph, Placed, Shape, blend};
 use crate::math::{Mat3, Pose, Vec3};
 use std::sync::Arc;
 
@@ -22,6 +25,10 @@ pub const RIGID_RATIO: f64 = 1e6;
 pub struct Side {
     /// The skeletons that can matter for this pair, as placed by [`Pair::place`].
     pub skeletons: Vec<Placed>,
+    /// How their fields go together.
+    pub graph: Graph,
+    /// For each skeleton, its position among the body's.
+    pub positions: Vec<u32>,
     /// Their shapes in their links' frames.
     pub locals: Vec<Shape>,
     /// For each skeleton, its slot in the world.
@@ -46,6 +53,8 @@ impl Side {
     /// Forgets the skeletons, keeps the memory.
     pub fn clear(&mut self) {
         self.skeletons.clear();
+        self.graph.clear();
+        self.positions.clear();
         self.locals.clear();
         self.ids.clear();
         self.links.clear();
@@ -57,24 +66,19 @@ impl Side {
     /// `f - c` and its gradient.
     #[inline]
     pub fn excess(&self, p: &Vec3) -> (f64, Vec3) {
-        let (value, gradient) = blend::value_gradient(&self.skeletons, p);
+        let (value, gradient) = blend::value_gradient(&self.skeletons, &self.graph, p);
         (value - self.isovalue, gradient)
     }
 
     fn excess_hessian(&self, p: &Vec3) -> (f64, Vec3, Mat3) {
-        let (value, gradient, hessian) = blend::value_gradient_hessian(&self.skeletons, p);
+        let (value, gradient, hessian) = blend::value_gradient_hessian(&self.skeletons, &self.graph, p);
         (value - self.isovalue, gradient, hessian)
     }
 
     /// Puts the skeletons where their links are, in a frame at `origin` with the world's axes.
     pub fn place(&mut self, motions: &[Motion], origin: &Vec3) {
         for (index, link) in self.links.iter().enumerate() {
-            let motion = &motions[*link as usize];
-            let pose = Pose {
-                // The difference of the centres is exact where the sum of pose and origin would not be.
-                position: (motion.center - origin) - motion.rotation * motion.local_center,
-                rotation: motion.rotation,
-            };
+            let pose = local_pose(&motions[*link as usize], origin);
             self.poses[index] = pose;
             self.skeletons[index].shape = self.locals[index].transformed(&pose);
         }
@@ -90,7 +94,7 @@ impl Side {
     /// convex core stays above its tangents, and fields fall with it.
     fn most(&self, center: &Vec3, legs: &[Vec3; 3]) -> f64 {
         const PLACES: [(f64, f64); 5] = [(0.0, 0.0), (1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)];
-        let mut sum = -self.isovalue;
+        let mut sum = self.graph.rise() - self.isovalue;
         for skeleton in &self.skeletons {
             let mut least = f64::NEG_INFINITY;
             for (x, y) in PLACES {
@@ -111,13 +115,37 @@ impl Side {
     }
 }
 
-/// Two bodies of which at least one is deformable.
+/// The pose of a link in a frame at `origin` with the world's axes.
+fn local_pose(motion: &Motion, origin: &Vec3) -> Pose {
+    Pose {
+        // The difference of the centres is exact where the sum of pose and origin would not be.
+        position: (motion.center - origin) - motion.rotation * motion.local_center,
+        rotation: motion.rotation,
+    }
+}
+
+/// A skeleton that blends with both sides of a pair, which are parts of one body.
+#[derive(Clone, Copy, Debug)]
+pub struct Cover {
+    /// The skeleton, as placed by [`Pair::place`].
+    pub skeleton: Placed,
+    /// Its shape in its link's frame.
+    pub local: Shape,
+    /// Its link's slot in the world.
+    pub link: u32,
+    /// How much it blends with the one that it blends with less.
+    pub weight: f64,
+}
+
+/// Two bodies, or two parts of one, of which at least one is deformable.
 #[derive(Debug, Default)]
 pub struct Pair {
     /// The first body.
     pub a: Side,
     /// The second body.
     pub b: Side,
+    /// What lies between two parts of one body.
+    pub covers: Vec<Cover>,
     wa: f64,
     wb: f64,
     /// Pressure a unit of `σ` \[Pa\].
@@ -172,6 +200,17 @@ impl Pair {
         self.origin = motions[lead as usize].center;
         self.a.place(motions, &self.origin);
         self.b.place(motions, &self.origin);
+        for cover in &mut self.covers {
+            let pose = local_pose(&motions[cover.link as usize], &self.origin);
+            cover.skeleton.shape = cover.local.transformed(&pose);
+        }
+    }
+
+    /// The cover that is the highest at a point, if it rises above the isovalue.
+    fn highest_cover(&self, p: &Vec3) -> Option<&Cover> {
+        let height = |cover: &&Cover| cover.weight * cover.skeleton.value(p);
+        let highest = self.covers.iter().max_by(|a, b| height(a).total_cmp(&height(b)))?;
+        (height(&highest) > self.a.isovalue).then_some(highest)
     }
 
     fn combine(&self, (alpha, ga): (f64, Vec3), (beta, gb): (f64, Vec3)) -> Sample {
@@ -188,14 +227,27 @@ impl Pair {
     /// Evaluates both fields at a point.
     #[inline]
     pub fn sample(&self, p: &Vec3) -> Sample {
-        self.combine(self.a.excess(p), self.b.excess(p))
+        let (mut a, mut b) = (self.a.excess(p), self.b.excess(p));
+        if let Some(cover) = self.highest_cover(p) {
+            let (value, gradient) = cover.skeleton.value_gradient(p);
+            let (over, slope) = (cover.weight * value - self.a.isovalue, gradient * cover.weight);
+            (a, b) = ((a.0 - over, a.1 - slope), (b.0 - over, b.1 - slope));
+        }
+        self.combine(a, b)
     }
 
     /// Evaluates both fields, and the Hessian of `σ` along the surface: that of the Lagrangian `σ + λ Φ` with the
     /// multiplier that makes its gradient tangential.
     pub fn sample_hessian(&self, p: &Vec3) -> (Sample, Mat3) {
-        let (alpha, ga, ha) = self.a.excess_hessian(p);
-        let (beta, gb, hb) = self.b.excess_hessian(p);
+        let (mut alpha, mut ga, mut ha) = self.a.excess_hessian(p);
+        let (mut beta, mut gb, mut hb) = self.b.excess_hessian(p);
+        if let Some(cover) = self.highest_cover(p) {
+            let (value, gradient, hessian) = cover.skeleton.value_gradient_hessian(p);
+            let (over, slope, bend) =
+                (cover.weight * value - self.a.isovalue, gradient * cover.weight, hessian * cover.weight);
+            (alpha, ga, ha) = (alpha - over, ga - slope, ha - bend);
+            (beta, gb, hb) = (beta - over, gb - slope, hb - bend);
+        }
         let sample = self.combine((alpha, ga), (beta, gb));
         let square = sample.difference_gradient.norm_squared();
         if square < 1e-300 {

@@ -93,21 +93,23 @@ fn find_patches(pair: &Pair, settings: &Settings, out: &mut Surface) -> Option<(
             }
             let (ta, tb) = (pair.a.skeletons[i].profile.thickness, pair.b.skeletons[j].profile.thickness);
             let overlap = (ta + tb - approach.distance) / ta.min(tb);
-            if overlap > most.0 {
+            // Where a neighbour lies between two parts of a body, these may be as close as they like.
+            let between = !pair.covers.is_empty() && pair.sample(&approach.meeting).sum <= 0.0;
+            if overlap > most.0 && !between {
                 most = (overlap, Some((i, j, approach)));
             }
-            let overloaded = is_overloaded(pair, i, j, &approach);
+            let overloaded = !between && is_overloaded(pair, i, j, &approach);
             if overloaded {
                 out.overloads.push((i, j, approach));
             }
-            let closed = matches!(settings.scheme, Scheme::Auto | Scheme::ClosedForm);
+            let closed = pair.covers.is_empty() && matches!(settings.scheme, Scheme::Auto | Scheme::ClosedForm);
             if closed && closed_patch(pair, &approach, out) {
                 return most.1;
             }
             if let Some(found) = deepest::find(pair, i, j, &approach) {
                 out.evaluations += found.evaluations;
                 out.maxima.push(found);
-            } else if !overloaded && approach.distance <= 0.0 {
+            } else if !overloaded && !between && approach.distance <= 0.0 {
                 // Core in core, and no surface between them.
                 out.overloads.push((i, j, approach));
             }
@@ -222,10 +224,10 @@ fn patch(pair: &Pair, settings: &Settings, at: &Deepest, extent: f64, out: &mut 
     let (first_border, first_cell) = (out.borders.len(), out.cells.len());
     let mut spent = 0;
     // Where skeletons blend, the surface has more than one face, and what lies between them may be missed.
-    let alone = pair.a.skeletons.len() == 1 && pair.b.skeletons.len() == 1;
+    let alone = pair.a.skeletons.len() == 1 && pair.b.skeletons.len() == 1 && pair.covers.is_empty();
     let facets = match settings.scheme {
         Scheme::Auto | Scheme::ClosedForm => alone,
-        scheme => scheme == Scheme::Facets,
+        scheme => scheme == Scheme::Facets && pair.covers.is_empty(),
     };
     if facets {
         let first_corner = out.outlines.len();

@@ -1,14 +1,51 @@
 //! Blending: how the fields of a body's skeletons become one field.
 //!
-//! Today every skeleton of a body blends with every other: the field is their sum \[97, eq. (1)\]. This module is the
-//! only place that knows, so a graph of who blends with whom belongs here.
+//! Without a graph, every skeleton of a body blends with every other: the field is their sum \[97, eq. (1)\]. With one,
+//! [`Graph`] says how fields go together; this module is the only place that asks.
 
+use std::cell::RefCell;
+
+use super::graph::{Active, Graph, Order, Workspace};
 use super::skeleton::Placed;
 use crate::math::{Mat3, Vec3};
 
+/// Working memory of a thread that evaluates grouped fields.
+#[derive(Default)]
+struct Scratch {
+    active: Vec<Active>,
+    gradients: Vec<Vec3>,
+    hessians: Vec<Mat3>,
+    work: Workspace,
+}
+
+thread_local! {
+    static SCRATCH: RefCell<Scratch> = RefCell::default();
+}
+
+/// Field value of all skeletons together.
+pub fn value(skeletons: &[Placed], graph: &Graph, p: &Vec3) -> f64 {
+    let each = skeletons.iter().enumerate().map(|(index, skeleton)| (index, skeleton.value(p)));
+    together(graph, each)
+}
+
+/// What the fields of some skeletons come to, given by their positions and values: the others' are zero.
+pub fn together(graph: &Graph, fields: impl Iterator<Item = (usize, f64)>) -> f64 {
+    if graph.is_complete() {
+        return fields.map(|(_, value)| value).sum();
+    }
+    SCRATCH.with_borrow_mut(|Scratch { active, work, .. }| {
+        active.clear();
+        active.extend(fields.filter(|(_, value)| *value != 0.0));
+        graph.combine(active, Order::Value, work)
+    })
+}
+
 /// Field value and gradient of all skeletons together.
 #[inline]
-pub fn value_gradient(skeletons: &[Placed], p: &Vec3) -> (f64, Vec3) {
+pub fn value_gradient(skeletons: &[Placed], graph: &Graph, p: &Vec3) -> (f64, Vec3) {
+    if !graph.is_complete() {
+        return grouped_gradient(skeletons, graph, p);
+    }
     let mut sum = (0.0, Vec3::zeros());
     for skeleton in skeletons {
         let (value, gradient) = skeleton.value_gradient(p);
@@ -18,8 +55,28 @@ pub fn value_gradient(skeletons: &[Placed], p: &Vec3) -> (f64, Vec3) {
     sum
 }
 
+#[inline(never)]
+fn grouped_gradient(skeletons: &[Placed], graph: &Graph, p: &Vec3) -> (f64, Vec3) {
+    SCRATCH.with_borrow_mut(|Scratch { active, gradients, work, .. }| {
+        active.clear();
+        gradients.clear();
+        for (index, skeleton) in skeletons.iter().enumerate() {
+            let (value, gradient) = skeleton.value_gradient(p);
+            if value != 0.0 {
+                active.push((index, value));
+                gradients.push(gradient);
+            }
+        }
+        let value = graph.combine(active, Order::Slopes, work);
+        (value, gradients.iter().zip(&work.slopes).map(|(gradient, slope)| gradient * *slope).sum())
+    })
+}
+
 /// Field value, gradient and Hessian of all skeletons together.
-pub fn value_gradient_hessian(skeletons: &[Placed], p: &Vec3) -> (f64, Vec3, Mat3) {
+pub fn value_gradient_hessian(skeletons: &[Placed], graph: &Graph, p: &Vec3) -> (f64, Vec3, Mat3) {
+    if !graph.is_complete() {
+        return grouped_hessian(skeletons, graph, p);
+    }
     let mut sum = (0.0, Vec3::zeros(), Mat3::zeros());
     for skeleton in skeletons {
         let (value, gradient, hessian) = skeleton.value_gradient_hessian(p);
@@ -28,6 +85,32 @@ pub fn value_gradient_hessian(skeletons: &[Placed], p: &Vec3) -> (f64, Vec3, Mat
         sum.2 += hessian;
     }
     sum
+}
+
+fn grouped_hessian(skeletons: &[Placed], graph: &Graph, p: &Vec3) -> (f64, Vec3, Mat3) {
+    SCRATCH.with_borrow_mut(|Scratch { active, gradients, hessians, work }| {
+        active.clear();
+        gradients.clear();
+        hessians.clear();
+        for (index, skeleton) in skeletons.iter().enumerate() {
+            let (value, gradient, hessian) = skeleton.value_gradient_hessian(p);
+            if value != 0.0 {
+                active.push((index, value));
+                gradients.push(gradient);
+                hessians.push(hessian);
+            }
+        }
+        let mut sum = (graph.combine(active, Order::Bends, work), Vec3::zeros(), Mat3::zeros());
+        for ((gradient, hessian), slope) in gradients.iter().zip(&*hessians).zip(&work.slopes) {
+            sum.1 += gradient * *slope;
+            sum.2 += hessian * *slope;
+        }
+        for (at, bend) in work.bends.iter().enumerate().filter(|(_, bend)| **bend != 0.0) {
+            let (i, j) = (at / active.len(), at % active.len());
+            sum.2 += gradients[i] * gradients[j].transpose() * *bend;
+        }
+        sum
+    })
 }
 
 /// The skeleton whose field is the highest at a point: its territory contains the point \[97, eq. (21)\].
@@ -42,8 +125,8 @@ pub fn territory(skeletons: &[Placed], p: &Vec3) -> usize {
     best.0
 }
 
-/// How far from a skeleton the body's surface can lie when `count` skeletons of the body may add up: somewhere on the
-/// surface one of them must still carry its share of the isovalue.
-pub fn reach(skeleton: &super::Profile, count: usize) -> f64 {
-    skeleton.distance_of_level(skeleton.isovalue / count.max(1) as f64)
+/// How far from a skeleton the body's surface can lie when `count` skeletons of the body may add up, and their field be
+/// above the sum by `rise`: somewhere on the surface one of them must still carry its share of the isovalue.
+pub fn reach(skeleton: &super::Profile, count: usize, rise: f64) -> f64 {
+    skeleton.distance_of_level((skeleton.isovalue - rise) / count.max(1) as f64)
 }

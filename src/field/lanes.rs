@@ -699,7 +699,7 @@ fn dot<const W: usize>(a: [Lanes<W>; 3], b: [Lanes<W>; 3]) -> Lanes<W> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::field::blend;
+    use crate::field::{Graph, blend};
     use crate::math::rotation_from_vector;
     use proptest::prelude::*;
 
@@ -779,7 +779,7 @@ mod tests {
                 .map(tolerance)
                 .fold((0.0, 0.0), |sum, error| (sum.0 + error.0, sum.1 + error.1));
             for ((p, value), gradient) in points.iter().zip(values).zip(gradients) {
-                let (expected, slope) = blend::value_gradient(&skeletons, p);
+                let (expected, slope) = blend::value_gradient(&skeletons, &Graph::default(), p);
                 prop_assert!((value - expected).abs() <= value_error, "{value} {expected}");
                 prop_assert!((Vec3::from(gradient) - slope).norm() <= gradient_error, "{gradient:?} {slope}");
             }

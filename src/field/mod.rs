@@ -4,10 +4,12 @@
 //! skeletons \[97, eq. (1)-(2)\]. The solid is where the field is at least the isovalue.
 
 pub mod blend;
+pub mod graph;
 pub mod lanes;
 pub mod profile;
 pub mod separation;
 pub mod skeleton;
 
+pub use graph::Graph;
 pub use profile::Profile;
 pub use skeleton::{Placed, Shape};

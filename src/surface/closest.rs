@@ -60,11 +60,9 @@ fn search(coat: &Coat, p: &Vec3, inside: bool, limit: f64) -> Option<Vec3> {
 /// The skeletons whose field reaches the ball of this radius round `p`.
 fn subset(coat: &Coat, p: &Vec3, radius: f64) -> Coat {
     let limit = radius * (1.0 + 1e-9);
-    let reaches = |k: &&Placed| k.shape.closest(p).distance - k.profile.radius < limit;
-    Coat {
-        skeletons: coat.skeletons.iter().filter(reaches).copied().collect(),
-        ..Coat::new(coat.origin, coat.isovalue)
-    }
+    let reaches = |k: &Placed| k.shape.closest(p).distance - k.profile.radius < limit;
+    let near = coat.skeletons.iter().enumerate().filter(|(_, k)| reaches(k));
+    coat.subset(&near.map(|(position, _)| position as u32).collect::<Vec<_>>())
 }
 
 /// The closest point of the surface of an isolated skeleton.
@@ -153,7 +151,7 @@ fn lowest(coat: &Coat, p: &Vec3, starts: impl Iterator<Item = Vec3>) -> Option<V
 /// each brought back to the surface and shortened until it gains.
 fn descend(coat: &Coat, p: &Vec3, mut x: Vec3) -> Vec3 {
     for _ in 0..60 {
-        let (_, gradient, hessian) = blend::value_gradient_hessian(&coat.skeletons, &x);
+        let (_, gradient, hessian) = blend::value_gradient_hessian(&coat.skeletons, &coat.graph, &x);
         let slope = gradient.norm();
         if slope == 0.0 {
             break;

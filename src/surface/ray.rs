@@ -81,6 +81,7 @@ impl Line {
 
 /// A skeleton whose field the line is in: tangent of its distance.
 struct Term<'a> {
+    position: usize,
     skeleton: &'a Placed,
     distance: f64,
     slope: f64,
@@ -105,39 +106,64 @@ impl Term<'_> {
 /// The first `s` in `[start, end)` where the field reaches the isovalue.
 fn first_root(coat: &Coat, line: &Line, start: f64, end: f64) -> Option<f64> {
     let enter = |skeleton: &Placed| line.entry(&skeleton.shape, skeleton.profile.radius, start, end);
-    let mut entries: Vec<(f64, &Placed)> = coat.skeletons.iter().filter_map(|k| Some((enter(k)?, k))).collect();
+    let skeletons = coat.skeletons.iter().enumerate();
+    let mut entries: Vec<(f64, usize)> = skeletons.filter_map(|(position, k)| Some((enter(k)?, position))).collect();
     entries.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut entries = entries.into_iter().peekable();
-    let mut active: Vec<&Placed> = Vec::new();
+    let mut active: Vec<usize> = Vec::new();
     let mut terms: Vec<Term> = Vec::new();
     let mut s = start;
+    // Where it last was outside, when steps may go too far.
+    let mut outside: Option<(f64, f64)> = None;
     loop {
         if active.is_empty() {
             s = s.max(entries.peek()?.0);
         }
-        while let Some((_, skeleton)) = entries.next_if(|entry| entry.0 <= s) {
-            active.push(skeleton);
+        while let Some((_, position)) = entries.next_if(|entry| entry.0 <= s) {
+            active.push(position);
         }
         terms.clear();
         // Convexity: a line that leaves the support of a field never comes back to it.
-        active.retain(|skeleton| {
+        active.retain(|position| {
+            let skeleton = &coat.skeletons[*position];
             let (distance, slope) = line.tangent(&skeleton.shape, s);
             let keep = distance < skeleton.profile.radius || slope < 0.0;
             if keep {
-                terms.push(Term { skeleton, distance, slope });
+                terms.push(Term { position: *position, skeleton, distance, slope });
             }
             keep
         });
-        let bound = |h: f64| terms.iter().map(|term| term.bound(h)).sum::<f64>() - coat.isovalue;
-        let excess = bound(0.0);
+        let level = coat.isovalue - coat.graph.rise();
+        let bound = |h: f64| terms.iter().map(|term| term.bound(h)).sum::<f64>() - level;
+        let excess_at = |x: f64| {
+            let p = line.at(x);
+            let fields = terms.iter().map(|term| (term.position, term.skeleton.value(&p)));
+            blend::together(&coat.graph, fields) - coat.isovalue
+        };
+        // Where not all fields add up, their sum is a bound only.
+        let most = bound(0.0);
+        let excess = if coat.graph.is_complete() { most } else { excess_at(s) };
         if excess >= 0.0 {
-            return Some(s);
+            let Some((before, excess_before)) = outside else { return Some(s) };
+            return Some(bracketed(before, s, -excess_before, -excess, |x| -coat.excess(&line.at(x))));
+        }
+        if !coat.graph.is_complete() {
+            outside = Some((s, excess));
         }
         let event = entries.peek().map_or(end, |entry| entry.0);
         let room = terms.iter().map(Term::length_to_surface).fold(event - s, f64::min);
         // On the tangent of a single field the bound reaches the isovalue exactly at the end of the room.
         let at_room = if terms.len() == 1 { 0.0 } else { bound(room) };
-        let step = if at_room <= 0.0 { room } else { bracketed(0.0, room, -excess, -at_room, |h| -bound(h)) };
+        let step = if most >= 0.0 {
+            0.0
+        } else if at_room <= 0.0 {
+            room
+        } else {
+            bracketed(0.0, room, -most, -at_room, |h| -bound(h))
+        };
+        // Nor does the field rise faster than all slopes together, or hardly so: a step too far is noticed.
+        let slopes = || terms.iter().map(|term| term.skeleton.profile.lipschitz()).sum::<f64>();
+        let step = if coat.graph.is_complete() { step } else { step.max((-excess / slopes()).min(event - s)) };
         if step >= event - s {
             if event >= end {
                 return None;
@@ -148,10 +174,9 @@ fn first_root(coat: &Coat, line: &Line, start: f64, end: f64) -> Option<f64> {
         let stride = terms.iter().map(|term| STRIDE * term.skeleton.profile.radius).fold(f64::INFINITY, f64::min);
         if terms.len() > 1 && step < stride {
             let ahead = (s + stride).min(event);
-            let field = |x: f64| coat.isovalue - terms.iter().map(|term| term.skeleton.value(&line.at(x))).sum::<f64>();
-            let at_ahead = field(ahead);
-            if at_ahead <= 0.0 {
-                return Some(bracketed(s, ahead, -excess, at_ahead, field));
+            let at_ahead = excess_at(ahead);
+            if at_ahead >= 0.0 {
+                return Some(bracketed(s, ahead, -excess, -at_ahead, |x| -excess_at(x)));
             }
             if ahead >= end {
                 return None;

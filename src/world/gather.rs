@@ -4,7 +4,7 @@ use super::{Body, Link, Skeleton, World};
 use crate::base::{Inertia, Kind, Motion};
 use crate::contact::broad_phase::Bounds;
 use crate::contact::candidate::Candidate;
-use crate::contact::pair::Side;
+use crate::contact::pair::{Cover, Side};
 use crate::contact::press::Material;
 use crate::field::{Placed, Shape};
 use crate::math::{Pose, Twist, Vec3};
@@ -40,7 +40,7 @@ impl World {
     }
 
     /// The enabled skeletons of a body, with the slots of their links and their own.
-    pub(super) fn skeletons_of<'a>(&'a self, body: &'a Body) -> impl Iterator<Item = (u32, u32, &'a Skeleton)> + 'a {
+    pub(super) fn skeletons_of<'a>(&'a self, body: &'a Body) -> impl Iterator<Item = Part<'a>> + 'a {
         let enabled_links = body.links.iter().filter(|link| self.links[**link as usize].enabled);
         enabled_links.flat_map(move |link| {
             self.links[*link as usize].skeletons.iter().filter_map(move |index| {
@@ -72,6 +72,7 @@ impl World {
         if candidate.pair.a.locals.is_empty() || candidate.pair.b.locals.is_empty() {
             return false;
         }
+        candidate.pair.covers.clear();
         candidate.pair.prepare();
         candidate.material = material(a, b);
         // The smaller body's link leads: its coordinates near the contact are the smallest.
@@ -82,31 +83,109 @@ impl World {
     }
 
     fn fill_side(&self, side: &mut Side, body: &Body, motions: &[Motion], region: &(Vec3, Vec3), dt: f64) {
-        side.clear();
-        side.isovalue = body.desc.isovalue;
-        side.stiffness_scale = body.stiffness_scale;
-        side.rigid = body.desc.rigid;
-        for (link, index, skeleton) in self.skeletons_of(body) {
-            let shape = skeleton.desc.shape;
-            let (low, high) = swept(&shape, skeleton.profile.radius, &motions[link as usize], dt);
-            let apart = (0..3).any(|axis| low[axis] > region.1[axis] || region.0[axis] > high[axis]);
-            if apart || is_above(&shape, &motions[link as usize].pose(), skeleton.profile.radius, region) {
-                continue;
+        side.begin(body);
+        for (position, part) in self.skeletons_of(body).enumerate() {
+            if self.is_within(&part, motions, region, dt) {
+                side.add(&part, position, self.desc.seed_count);
             }
-            side.skeletons.push(Placed { shape, profile: skeleton.profile });
-            side.locals.push(shape);
-            side.poses.push(Pose::default());
-            side.links.push(link);
-            side.ids.push(index);
-            side.reach.push(skeleton.reach);
-            side.rays.push(skeleton.rays(self.desc.seed_count));
         }
+        if let Some(blending) = &body.blending {
+            blending.graph.restrict(&side.positions, &mut side.graph);
+        }
+    }
+
+    /// Whether the field of a skeleton may reach a region during a step.
+    fn is_within(&self, part: &Part, motions: &[Motion], region: &(Vec3, Vec3), dt: f64) -> bool {
+        let (link, _, skeleton) = part;
+        let (shape, motion, radius) = (&skeleton.desc.shape, &motions[*link as usize], skeleton.profile.radius);
+        let (low, high) = swept(shape, radius, motion, dt);
+        let apart = (0..3).any(|axis| low[axis] > region.1[axis] || region.0[axis] > high[axis]);
+        !apart && !is_above(shape, &motion.pose(), radius, region)
+    }
+
+    /// Fills a candidate with two parts of one body that collide. False when they are not close enough.
+    pub(super) fn fill_block(&self, candidate: &mut Candidate, motions: &[Motion], dt: f64) -> bool {
+        let body = &self.bodies[candidate.bodies[0] as usize];
+        let Some(blending) = &body.blending else { return false };
+        let block = &blending.blocks[candidate.block as usize];
+        let part = |position: u32| -> Part {
+            let slot = blending.order[position as usize];
+            let skeleton = &self.skeletons[slot as usize];
+            (skeleton.link, slot, skeleton)
+        };
+        // Where the surfaces of both may lie.
+        let mut region = (Vec3::repeat(f64::NEG_INFINITY), Vec3::repeat(f64::INFINITY));
+        for side in &block.sides {
+            let mut bounds = (Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY));
+            for position in side {
+                let (link, _, skeleton) = part(*position);
+                let (low, high) = swept(&skeleton.desc.shape, skeleton.reach, &motions[link as usize], dt);
+                bounds = (bounds.0.inf(&low), bounds.1.sup(&high));
+            }
+            region = (region.0.sup(&bounds.0), region.1.inf(&bounds.1));
+        }
+        let pair = &mut candidate.pair;
+        pair.covers.clear();
+        for (side, positions) in [&mut pair.a, &mut pair.b].into_iter().zip(&block.sides) {
+            side.begin(body);
+            side.stiffness_scale *= block.share;
+            for position in positions {
+                let part = part(*position);
+                if self.is_within(&part, motions, &region, dt) {
+                    side.add(&part, *position as usize, self.desc.seed_count);
+                }
+            }
+        }
+        if (0..3).any(|axis| region.0[axis] > region.1[axis])
+            || pair.a.skeletons.is_empty()
+            || pair.b.skeletons.is_empty()
+        {
+            return false;
+        }
+        for (position, weight) in &block.covers {
+            let part = part(*position);
+            if self.is_within(&part, motions, &region, dt) {
+                let (link, _, Skeleton { desc, profile, .. }) = part;
+                let skeleton = Placed { shape: desc.shape, profile: *profile };
+                pair.covers.push(Cover { skeleton, local: desc.shape, link, weight: *weight });
+            }
+        }
+        pair.prepare();
+        candidate.material = material(body, body);
+        candidate.lead = pair.a.links[0];
+        true
     }
 
     /// The thinnest coat of a link's skeletons.
     pub(super) fn thinnest(&self, link: &Link) -> f64 {
         let thickness = |index: &u32| self.skeletons[*index as usize].profile.thickness;
         link.skeletons.iter().map(thickness).fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// A skeleton with the slots of its link and its own.
+type Part<'a> = (u32, u32, &'a Skeleton);
+
+impl Side {
+    /// Begins to fill a side with a body's skeletons.
+    fn begin(&mut self, body: &Body) {
+        self.clear();
+        self.isovalue = body.desc.isovalue;
+        self.stiffness_scale = body.stiffness_scale;
+        self.rigid = body.desc.rigid;
+    }
+
+    /// Adds a skeleton, by its position among the enabled ones of the body.
+    fn add(&mut self, (link, index, skeleton): &Part, position: usize, seed_count: u32) {
+        let shape = skeleton.desc.shape;
+        self.skeletons.push(Placed { shape, profile: skeleton.profile });
+        self.positions.push(position as u32);
+        self.locals.push(shape);
+        self.poses.push(Pose::default());
+        self.links.push(*link);
+        self.ids.push(*index);
+        self.reach.push(skeleton.reach);
+        self.rays.push(skeleton.rays(seed_count));
     }
 }
 

@@ -3,6 +3,7 @@
 //! This file holds the nouns and their life; [`step`] is the pipeline, [`query`] what can be asked in between.
 
 pub use crate::handle as arena;
+mod blend;
 mod bytes;
 pub mod desc;
 pub mod draw;
@@ -42,6 +43,8 @@ pub struct Body {
     pub(crate) stacked: u8,
     /// What has been said about its units since its last change.
     pub(crate) units: units::Said,
+    /// Who blends with whom, unless all do.
+    blending: Option<Box<blend::Blending>>,
     sleep: sleep::Sleep,
 }
 
@@ -201,6 +204,7 @@ impl World {
             dissipation,
             stacked: 0,
             units: units::Said::default(),
+            blending: None,
             sleep: sleep::Sleep::default(),
         })
     }
@@ -296,6 +300,10 @@ impl World {
     pub fn destroy_link(&mut self, id: LinkId) -> Result<()> {
         let body = self.links.get(id)?.body as usize;
         self.bodies[body].links.retain(|index| *index != id.raw.index);
+        if let Some(blending) = &mut self.bodies[body].blending {
+            blending.forget_link(id.raw.index);
+            self.links[id.index()].skeletons.iter().for_each(|skeleton| blending.forget_skeleton(*skeleton));
+        }
         self.drop_link(id.index())?;
         self.refresh(body);
         Ok(())
@@ -370,11 +378,12 @@ impl World {
         let skeletons: Vec<u32> = self.skeletons_of(body).map(|(_, index, _)| index).collect();
         for index in &skeletons {
             let skeleton = &mut self.skeletons[*index as usize];
-            skeleton.reach = crate::field::blend::reach(&skeleton.profile, skeletons.len());
+            skeleton.reach = crate::field::blend::reach(&skeleton.profile, skeletons.len(), 0.0);
         }
         let derived = units::derive(self, body);
         let body = &mut self.bodies[slot];
         (body.stiffness_scale, body.dissipation) = derived;
+        self.measure_blending(slot);
     }
 
     /// Creates a skeleton of a link. A plane needs a link of kind fixed.
@@ -408,6 +417,9 @@ impl World {
         let link = &mut self.links[skeleton.link as usize];
         link.skeletons.retain(|index| *index != id.raw.index);
         let body = link.body as usize;
+        if let Some(blending) = &mut self.bodies[body].blending {
+            blending.forget_skeleton(id.raw.index);
+        }
         self.refresh(body);
         Ok(())
     }

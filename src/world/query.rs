@@ -83,6 +83,9 @@ impl World {
                 }
             }
         }
+        if let Some(blending) = &body.blending {
+            coat.graph.clone_from(&blending.graph);
+        }
         PosedCoat { coat, skeletons }
     }
 
@@ -101,7 +104,7 @@ impl World {
     /// The field of a body at points of the world: values into `values`, gradients \[1/m\] into `gradients`, each as
     /// long as `points` if given.
     ///
-    /// The value is the sum over the skeletons \[97, eq. (1)\]: the surface is where it equals the body's isovalue, the
+    /// The value is the sum over the skeletons \[97, eq. (1)\], or what a blend graph makes of them: the surface is where it equals the body's isovalue, the
     /// solid where it is larger. Zero for a body without enabled skeletons.
     pub fn evaluate_field(
         &self,
@@ -119,8 +122,22 @@ impl World {
             return Err(out_of_range("point", format_args!("({}, {}, {})", p[0], p[1], p[2]), "finite"));
         }
         let posed = self.posed_coat(body.index());
-        let local: Vec<[f64; 3]> = points.iter().map(|p| posed.localise(&Vec3::from(*p)).into()).collect();
-        lanes::evaluate(&posed.coat.skeletons, &local, values, gradients);
+        let localise = |p: &[f64; 3]| posed.localise(&Vec3::from(*p));
+        if posed.coat.graph.is_complete() {
+            let local: Vec<[f64; 3]> = points.iter().map(|p| localise(p).into()).collect();
+            lanes::evaluate(&posed.coat.skeletons, &local, values, gradients);
+            return Ok(());
+        }
+        let (mut values, mut gradients) = (values, gradients);
+        for (index, p) in points.iter().enumerate() {
+            let (excess, gradient) = posed.coat.excess_gradient(&localise(p));
+            if let Some(values) = &mut values {
+                values[index] = excess + posed.coat.isovalue;
+            }
+            if let Some(gradients) = &mut gradients {
+                gradients[index] = gradient.into();
+            }
+        }
         Ok(())
     }
 

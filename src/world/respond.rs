@@ -253,7 +253,8 @@ impl World {
     fn notice_stacks(&mut self, state: &mut Stepping) {
         state.touches.clear();
         state.touches.resize(self.bodies.capacity(), 0);
-        for candidate in state.candidates.iter().filter(|candidate| candidate.memory.touching) {
+        let between = |candidate: &&Candidate| candidate.bodies[0] != candidate.bodies[1];
+        for candidate in state.candidates.iter().filter(between).filter(|candidate| candidate.memory.touching) {
             for body in candidate.bodies {
                 state.touches[body as usize] += 1;
             }

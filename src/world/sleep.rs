@@ -8,7 +8,7 @@
 use super::step::Stepping;
 use super::{Body, BodyId, Contact, Link, World};
 use crate::base::Kind;
-use crate::contact::candidate::Memory;
+use crate::contact::candidate::{Candidate, Memory};
 use crate::error::Result;
 use crate::handle::Arena;
 use crate::math::Twist;
@@ -132,7 +132,7 @@ impl World {
             state.candidates.push(candidate);
         }
         if state.candidates.len() > before {
-            state.candidates.sort_unstable_by_key(|candidate| candidate.bodies);
+            state.candidates.sort_unstable_by_key(Candidate::key);
         }
     }
 
@@ -197,7 +197,7 @@ impl World {
             state.resting.push(std::mem::take(&mut candidate.memory));
             state.spare.push(candidate);
         }
-        state.resting.sort_unstable_by_key(|memory| memory.ids.map(|id| id.index));
+        state.resting.sort_unstable_by_key(Memory::key);
         let rests = |contact: &Contact| contact.bodies.iter().any(|id| is_asleep(bodies, id.raw.index));
         state.contacts.sort_by_key(|contact| !rests(contact));
         state.resting_contacts = state.contacts.partition_point(rests);

@@ -15,6 +15,7 @@
 
 use std::hash::{BuildHasher, RandomState};
 
+use super::blend::{Blending, Pairing};
 use super::bytes::{Counter, Cursor, Lasting, Reader, Sink, enums, structs, write_list};
 use super::sleep::Sleep;
 use super::{
@@ -26,7 +27,7 @@ use crate::contact::Scheme;
 use crate::contact::candidate::Memory;
 use crate::contact::friction::Bristle;
 use crate::error::{Error, Result, require, require_finite};
-use crate::field::{Profile, Shape};
+use crate::field::{Graph, Profile, Shape};
 use crate::handle::{Arena, Id, Noun, RawId, Slot, WorldTag};
 use crate::math::{Pose, Twist, Wrench};
 use crate::response::mirror::Mirror;
@@ -34,7 +35,7 @@ use crate::response::{Response, VelocityConvention};
 use crate::team::Alone;
 
 /// What the lists below say. Another number is refused: no snapshot is ever half understood.
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
 const MAGIC: [u8; 8] = *b"isocoat\0";
 /// Offsets of the parts of the header.
 const FORMAT_AT: usize = 8;
@@ -61,7 +62,7 @@ structs! {
     }
     BodyDesc {
         rigid, response, isovalue, stiffness_scale, stiffness, friction, static_friction, viscous_friction, dissipation,
-        category, mask, may_sleep, user_data,
+        category, mask, blend_band, self_contact, may_sleep, user_data,
     }
     LinkDesc {
         kind, pose, twist, mass, local_center, inertia, gravity_scale, external_acceleration,
@@ -70,7 +71,9 @@ structs! {
     }
     SkeletonDesc { shape, thickness, stiffness, stiffening, radius, seed_count, user_data }
     // What the descriptor comes to follows from the parts.
-    Body { desc, links, enabled, stacked, units, sleep; stiffness_scale: 0.0, dissipation: 0.0 }
+    Body { desc, links, enabled, stacked, units, blending, sleep; stiffness_scale: 0.0, dissipation: 0.0 }
+    Blending { by_links, joints, pairs; graph: Graph::default(), order: Vec::new(), blocks: Vec::new() }
+    Pairing { skeletons, weight, target, rate, apart }
     Link {
         desc, body, skeletons, enabled, applied_force, applied_impulse, contact_impulse, host_impulse, last_dt, mirror,
     }
@@ -81,7 +84,7 @@ structs! {
     Mirror {
         active, twist, expected_center, expected_rotation, expected_twist, commanded, owed, estimate, bypassed, doubt,
     }
-    Memory { ids, touching, touched, overloaded, was_overloaded, rate2, bristles }
+    Memory { ids, part, touching, touched, overloaded, was_overloaded, rate2, bristles }
     Bristle { key, slip, turn, sliding, seen }
     Contact {
         bodies, links, skeletons, position, normal, force, torque, area, peak_pressure, stiffness, error_estimate,
@@ -365,9 +368,41 @@ impl World {
         for index in self.bodies.indices() {
             let body = &self.bodies[index];
             body.desc.validate().map_err(|error| refused(format_args!("body {index}"), error))?;
+            if let Some(blending) = &body.blending {
+                self.check_blending(index, blending)?;
+            }
         }
         for index in self.links.indices() {
             check_link(&self.links[index]).map_err(|error| refused(format_args!("link {index}"), error))?;
+        }
+        Ok(())
+    }
+
+    /// What a blend graph says is about parts of its body, and in order.
+    fn check_blending(&self, body: usize, blending: &Blending) -> Result<()> {
+        let refuse = |why: &str| Err(Error::Snapshot(format!("blend graph of body {body}: {why}")));
+        let is_link = |link: u32| self.links.is_live(link as usize) && self.links[link as usize].body as usize == body;
+        let is_skeleton = |skeleton: u32| {
+            self.skeletons.is_live(skeleton as usize) && is_link(self.skeletons[skeleton as usize].link)
+        };
+        if blending.joints.iter().flatten().any(|link| !is_link(*link)) {
+            return refuse("a joint of a link that is not the body's");
+        }
+        let mut last = None;
+        for Pairing { skeletons, weight, target, rate, apart: _ } in &blending.pairs {
+            if skeletons[0] >= skeletons[1] || last >= Some(*skeletons) {
+                return refuse("pairs not in order");
+            }
+            last = Some(*skeletons);
+            if skeletons.iter().any(|skeleton| !is_skeleton(*skeleton)) {
+                return refuse("a pair of skeletons that are not the body's");
+            }
+            for weight in weight.iter().chain([target]) {
+                require("weight", *weight, "from 0 to 1", |x| (0.0..=1.0).contains(&x))
+                    .map_err(|error| refused(format_args!("blend graph of body {body}"), error))?;
+            }
+            require("rate of a weight", *rate, "finite and at least 0", |x| x >= 0.0)
+                .map_err(|error| refused(format_args!("blend graph of body {body}"), error))?;
         }
         Ok(())
     }
@@ -396,7 +431,8 @@ impl World {
     fn check_memories(&self, memories: &[Memory]) -> Result<()> {
         let (_, _, given) = self.bodies.parts();
         let mut last = None;
-        for Memory { ids, touching: _, touched: _, overloaded: _, was_overloaded: _, rate2, bristles } in memories {
+        for Memory { ids, part, touching: _, touched: _, overloaded: _, was_overloaded: _, rate2, bristles } in memories
+        {
             let pair = ids.map(|id| id.index);
             let refuse = |why: &str| Err(Error::Snapshot(format!("pair of bodies {} and {}: {why}", pair[0], pair[1])));
             if ids
@@ -405,10 +441,14 @@ impl World {
             {
                 return refuse("no such bodies have ever been");
             }
-            if pair[0] >= pair[1] || last >= Some(pair) {
+            let of_one = pair[0] == pair[1];
+            if of_one && part.iter().any(|skeleton| *skeleton as usize >= self.skeletons.capacity()) {
+                return refuse("parts of skeletons that have never been");
+            }
+            if pair[0] > pair[1] || of_one != (*part != [0; 2]) || last >= Some((pair, *part)) {
                 return refuse("not in order");
             }
-            last = Some(pair);
+            last = Some((pair, *part));
             if rate2.is_nan() || *rate2 < 0.0 {
                 return refuse("the rate is not a number of at least 0");
             }

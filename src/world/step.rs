@@ -7,6 +7,7 @@ use super::respond::{Worker, unlocked};
 use super::{BodyId, Link, World, units};
 use crate::base::{Kind, Motion};
 use crate::clock::Clock;
+use crate::coat::cliques::Block;
 use crate::contact::broad_phase::{self, Bounds};
 use crate::contact::candidate::{Candidate, Memory};
 use crate::contact::{pair::Side, surface};
@@ -34,6 +35,7 @@ pub(crate) struct Stepping {
     last_bounds: Vec<Bounds>,
     new_bounds: Vec<Bounds>,
     met: Vec<[u32; 2]>,
+    meetings: Vec<Meeting>,
     /// In the order of their bodies.
     pub(super) candidates: Vec<Candidate>,
     /// Those of the last step, then their memory for reuse.
@@ -60,6 +62,14 @@ pub(crate) struct Stepping {
     events: Vec<Event>,
     pub(super) counters: Counters,
     pub(super) times: Times,
+}
+
+/// Two bodies, or two parts of one body by the first skeleton of each, and which of its blocks these are.
+#[derive(Clone, Copy, Debug)]
+struct Meeting {
+    bodies: [u32; 2],
+    part: [u32; 2],
+    block: u32,
 }
 
 /// An island, and what the world notes about it.
@@ -127,6 +137,7 @@ impl Stepping {
             bounds: _,
             bounds_of: _,
             pairs: _,
+            meetings: _,
             last_bounds: _,
             new_bounds: _,
             met: _,
@@ -192,6 +203,7 @@ impl World {
     fn run(&mut self, state: &mut Stepping, dt: f64, team: &Team) {
         let timed = self.desc.timed;
         let (mut whole, mut clock, mut times) = (Clock::start(timed), Clock::start(timed), Times::default());
+        self.ramp_blends(dt);
         self.begin(state, dt);
         clock.lap(&mut times.begin);
         self.find_candidates(state, dt, team);
@@ -272,34 +284,59 @@ impl World {
             !asleep && self.may_touch(pair, &state.motions, &mut filter)
         });
         *self.pair_filter.get_mut() = filter;
+        self.list_meetings(state);
         let mut old = 0;
-        for pair in &state.pairs {
-            while old < state.previous.len() && state.previous[old].bodies < *pair {
+        for Meeting { bodies, part, block } in &state.meetings {
+            let key = (*bodies, *part);
+            while old < state.previous.len() && state.previous[old].key() < key {
                 old += 1;
             }
             // A body that took over the slot of a destroyed one is another body.
-            let ids = pair.map(|body| self.bodies.id_of(body as usize).raw);
-            let known = state.previous.get(old).is_some_and(|last| last.bodies == *pair && last.memory.ids == ids);
+            let ids = bodies.map(|body| self.bodies.id_of(body as usize).raw);
+            let known = state.previous.get(old).is_some_and(|last| last.key() == key && last.memory.ids == ids);
             let mut candidate = if known {
                 std::mem::take(&mut state.previous[old])
             } else {
                 let mut fresh = state.spare.pop().unwrap_or_default();
                 fresh.memory.forget();
-                fresh.memory.ids = ids;
+                (fresh.memory.ids, fresh.memory.part) = (ids, *part);
                 fresh
             };
-            candidate.bodies = *pair;
+            (candidate.bodies, candidate.block) = (*bodies, *block);
             state.candidates.push(candidate);
         }
         let (motions, bounds, bounds_of) = (&state.motions, &state.bounds, &state.bounds_of);
         team.each_mut(&mut state.candidates, FILLED, |_, candidate| {
-            let bounds = candidate.bodies.map(|body| &bounds[bounds_of[body as usize]]);
-            candidate.close = self.fill(candidate, motions, bounds, dt);
+            let [a, b] = candidate.bodies;
+            candidate.close = if a == b {
+                self.fill_block(candidate, motions, dt)
+            } else {
+                let bounds = [a, b].map(|body| &bounds[bounds_of[body as usize]]);
+                self.fill(candidate, motions, bounds, dt)
+            };
             candidate.memory.touched = false;
         });
         // What no skeleton is close enough for goes back to where it came from.
         for candidate in state.candidates.extract_if(.., |candidate| !candidate.close) {
             state.previous.push(candidate);
+        }
+    }
+
+    /// What may meet: pairs of bodies, and of parts that collide of one body, in order.
+    fn list_meetings(&self, state: &mut Stepping) {
+        state.meetings.clear();
+        state.meetings.extend(state.pairs.iter().map(|bodies| Meeting { bodies: *bodies, part: [0; 2], block: 0 }));
+        let between = state.meetings.len();
+        for slot in self.bodies.indices() {
+            let body = &self.bodies[slot];
+            let Some(blending) = body.blending.as_ref().filter(|_| body.enabled && !body.is_asleep()) else { continue };
+            for (block, Block { sides, .. }) in blending.blocks.iter().enumerate() {
+                let part = [&sides[0], &sides[1]].map(|side| blending.order[side[0] as usize]);
+                state.meetings.push(Meeting { bodies: [slot as u32; 2], part, block: block as u32 });
+            }
+        }
+        if state.meetings.len() > between {
+            state.meetings.sort_unstable_by_key(|meeting| (meeting.bodies, meeting.part));
         }
     }
 
@@ -538,28 +575,41 @@ impl World {
         }
     }
 
-    /// The contacts of two bodies at their present poses, without stepping: the elastic forces alone.
+    /// The contacts of two bodies at their present poses, without stepping: the elastic forces alone. Of a body with
+    /// itself, those of its parts that don't blend.
     pub fn collide(&self, a: BodyId, b: BodyId, scheme: super::Scheme, tolerance: f64) -> Result<Vec<Contact>> {
         require("tolerance", tolerance, "from 1e-9 to 0.5", |x| (1e-9..=0.5).contains(&x))?;
         self.bodies.get(a)?;
         self.bodies.get(b)?;
-        if a == b {
-            return Err(crate::Error::Unsupported("a body does not collide with itself"));
-        }
         let motions: Vec<Motion> = (0..self.links.capacity())
             .map(|index| if self.links.is_live(index) { self.motion_of(&self.links[index]) } else { Motion::default() })
             .collect();
         let mut candidate = Candidate::default();
         candidate.bodies = [a.raw.index, b.raw.index];
-        let bounds = [a, b].map(|body| self.bounds_of(body.index(), &motions, 0.0));
         let mut contacts = Vec::new();
-        let [Some(first), Some(second)] = &bounds else { return Ok(contacts) };
-        if self.fill(&mut candidate, &motions, [first, second], 0.0) {
+        let settings = surface::Settings { scheme, tolerance };
+        let mut add = |candidate: &mut Candidate| {
             candidate.pair.place(&motions, candidate.lead);
-            let settings = surface::Settings { scheme, tolerance };
             surface::integrate(&candidate.pair, &settings, &mut candidate.surface);
+            candidate.loads.clear();
             candidate.loads.extend(candidate.surface.sums());
-            self.contacts_of(&candidate, &mut contacts);
+            self.contacts_of(candidate, &mut contacts);
+        };
+        if a == b {
+            let blocks = self.bodies[a.index()].blending.as_ref().map_or(0, |blending| blending.blocks.len());
+            for block in 0..blocks as u32 {
+                candidate.block = block;
+                if self.fill_block(&mut candidate, &motions, 0.0) {
+                    add(&mut candidate);
+                }
+            }
+            return Ok(contacts);
+        }
+        let bounds = [a, b].map(|body| self.bounds_of(body.index(), &motions, 0.0));
+        if let [Some(first), Some(second)] = &bounds
+            && self.fill(&mut candidate, &motions, [first, second], 0.0)
+        {
+            add(&mut candidate);
         }
         Ok(contacts)
     }
