@@ -238,7 +238,7 @@ fn settled(mut world: World, steps: usize) -> World {
 
 /// Needs two cores that nobody else uses: `make workers`.
 #[test]
-#[ignore = "measures time"]
+#[ignore = "measures time: make workers"]
 fn two_workers_are_nearly_twice_as_fast_on_125_bodies() {
     let mut slow = Vec::new();
     let scenes: [Scene; 3] = [

@@ -78,7 +78,7 @@ fn half_the_sub_step_has_a_quarter_of_the_error() {
 const BUDGET: f64 = 4e-3;
 
 #[test]
-#[ignore = "takes minutes; make trade"]
+#[ignore = "takes minutes: make trade"]
 fn the_whole_grid() {
     let begin = clock::cpu_seconds();
     let done = |what: &str| println!("{:6.1} s  {what}", clock::cpu_seconds() - begin);
