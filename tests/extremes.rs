@@ -362,7 +362,7 @@ fn the_ends_of_the_sweeps_hold() {
 }
 
 #[test]
-#[ignore = "takes long; make extremes"]
+#[ignore = "takes long: make extremes"]
 fn all_rows() {
     let (text, failures) = table(false);
     let head = "# Extremes\n\nWritten by `make extremes`: one parameter at a time, 60 Hz, at most 600 steps and five seconds \

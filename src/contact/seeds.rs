@@ -61,7 +61,7 @@ pub const STAND_IN: usize = 1024;
 
 /// Integrates all of a pair's contact with the seeds of both coats, at `least` so many a skeleton.
 pub fn integrate(pair: &Pair, least: usize, out: &mut Surface) {
-    if out.maxima().is_empty() {
+    if out.maxima.is_empty() {
         return;
     }
     let mut tally = Tally::default();
@@ -80,7 +80,7 @@ pub fn integrate(pair: &Pair, least: usize, out: &mut Surface) {
                 let [i, j] = if from_a { [index, partner] } else { [partner, index] };
                 approach(pair, i, j).distance < other.reach[partner]
             });
-            let rays: &[Ray] = if let Shape::Plane { point, normal } = &shape {
+            let sent: &[Ray] = if let Shape::Plane { point, normal } = &shape {
                 let (low, high) = finite_bounds(other);
                 made.clear();
                 plane_rays(point, normal, spacing(other, least), &low, &high, &mut made);
@@ -93,7 +93,7 @@ pub fn integrate(pair: &Pair, least: usize, out: &mut Surface) {
                 &own.rays[index]
             };
             let pose = own.poses[index];
-            for ray in rays {
+            for ray in sent {
                 let ray = if matches!(shape, Shape::Plane { .. }) { *ray } else { ray.transformed(&pose) };
                 cast(pair, from_a, index, reached, &ray, &mut out.nodes, &mut tally);
             }
@@ -238,32 +238,35 @@ fn spacing(side: &Side, least: usize) -> f64 {
 
 /// Gives each node to its nearest deepest point: one patch a deepest point that received any.
 fn share_out(pair: &Pair, first: usize, tally: &Tally, out: &mut Surface) {
-    let maxima: Vec<Deepest> = out.maxima().to_vec();
     // Coats never pull: what does, and is in doubt, is worth nothing. The overlap is left to the push-out then.
-    let pull = -out.nodes[first..].iter().map(|node| node.force.dot(&maxima[0].normal)).sum::<f64>();
+    let normal = out.maxima[0].normal;
+    let pull = -out.nodes[first..].iter().map(|node| node.force.dot(&normal)).sum::<f64>();
     if pull >= 0.0 && tally.doubt() >= 1.0 {
         out.nodes.truncate(first);
         out.evaluations += tally.evaluations;
         return;
     }
+    let maxima = &out.maxima;
     let nearest = |p: &Vec3| {
         let distance = |m: &Deepest| (m.position - p).norm_squared();
         (0..maxima.len()).min_by(|i, j| distance(&maxima[*i]).total_cmp(&distance(&maxima[*j]))).unwrap_or(0)
     };
-    let mut owners: Vec<(usize, Node)> = out.nodes.drain(first..).map(|node| (nearest(&node.position), node)).collect();
-    owners.sort_by_key(|(owner, _)| *owner);
+    let mut owned = std::mem::take(&mut out.owned);
+    owned.clear();
+    owned.extend(out.nodes.drain(first..).map(|node| (nearest(&node.position), node)));
+    // Nodes of one owner stay in the order of their rays.
+    owned.sort_by_key(|(owner, _)| *owner);
     let points =
         [&pair.a, &pair.b].iter().all(|side| side.skeletons.iter().all(|one| matches!(one.shape, Shape::Point(_))));
     let law = if points { POINTS } else { PARTS };
     let mut rest = tally.evaluations;
-    for (index, at) in maxima.iter().enumerate() {
+    for patch in owned.chunk_by(|x, y| x.0 == y.0) {
         let begin = out.nodes.len();
-        out.nodes.extend(owners.iter().filter(|(owner, _)| *owner == index).map(|(_, node)| *node));
-        let count = out.nodes.len() - begin;
-        if count > 0 {
-            let error = (law * (count as f64).powf(-1.2) + tally.doubt()).min(1.0);
-            out.push(at, begin, pair.scale, error, rest, Scheme::Seeds);
-            rest = 0;
-        }
+        out.nodes.extend(patch.iter().map(|(_, node)| *node));
+        let error = (law * (patch.len() as f64).powf(-1.2) + tally.doubt()).min(1.0);
+        let at = out.maxima[patch[0].0];
+        out.push(&at, begin, pair.scale, error, rest, Scheme::Seeds);
+        rest = 0;
     }
+    out.owned = owned;
 }

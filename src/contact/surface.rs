@@ -33,7 +33,8 @@ pub struct Surface {
     pub overloads: Vec<(usize, usize, Approach)>,
     /// Evaluations of the two fields, fruitless ones included.
     pub evaluations: u32,
-    maxima: Vec<Deepest>,
+    /// What the last integration found, the deepest first.
+    pub(super) maxima: Vec<Deepest>,
     covered: Vec<Covered>,
     borders: Vec<f64>,
     cells: Vec<(i32, i32)>,
@@ -42,6 +43,8 @@ pub struct Surface {
     polar: polar::Workspace,
     /// Rays that the seeds made for one use.
     pub(super) rays: Vec<Ray>,
+    /// Their nodes, each with the place of its nearest maximum.
+    pub(super) owned: Vec<(usize, Node)>,
     pieces: facets::Workspace,
 }
 
@@ -139,11 +142,6 @@ fn find_patches(pair: &Pair, settings: &Settings, out: &mut Surface) -> Option<(
 }
 
 impl Surface {
-    /// The maxima found by the last integration, the deepest first.
-    pub fn maxima(&self) -> &[Deepest] {
-        &self.maxima
-    }
-
     /// Whether a point of the surface lies within a region.
     fn contains(&self, region: &Covered, p: &Vec3) -> bool {
         let (Covered::Polar(frame, range) | Covered::Cells(frame, range) | Covered::Outline(frame, range)) = region;

@@ -8,7 +8,6 @@
 
 namespace {
 
-constexpr double gravity = 10.0;
 bool as_table = false;
 
 struct response_kind {
@@ -47,13 +46,6 @@ void respond(scene &world, const btRigidBody *body, isocoat_response response) {
     must(isocoat_body_set_desc(world.coats, coat, &desc));
 }
 
-double energy_of(const btRigidBody &body) {
-    const btVector3 turn = body.getAngularVelocity();
-    const btVector3 spin = body.getInvInertiaTensorWorld().inverse() * turn;
-    return 0.5 * double(body.getLinearVelocity().length2() / body.getInvMass() + spin.dot(turn)) +
-           gravity * double(body.getCenterOfMassPosition().y() / body.getInvMass());
-}
-
 /// Steps, and watches energy above `lowest` and what `beyond` says of a body.
 template <class beyond_fn>
 outcome watch(scene &world, const std::vector<btRigidBody *> &moving, double tick, double seconds, double lowest,
@@ -88,7 +80,7 @@ outcome watch(scene &world, const std::vector<btRigidBody *> &moving, double tic
 /// Three links on hinges, let go from the side, fall against a wall.
 outcome pendulum(const knobs &set, isocoat_response response) {
     const material made_of{set.modulus, 0.2, 0.3};
-    scene world(-gravity);
+    scene world;
     constexpr double wall = -0.35;
     btRigidBody *plane = world.add_coated(
         0, btVector3(0, 0, 0), std::make_unique<btStaticPlaneShape>(btVector3(1, 0, 0), btScalar(wall)), made_of, 0.5);
@@ -126,7 +118,7 @@ outcome pendulum(const knobs &set, isocoat_response response) {
 /// A ball let fall on a floor while it spins about a slanted axis.
 outcome spinning_ball(const knobs &set, isocoat_response response) {
     const material made_of{set.modulus, 0.5, 0.1};
-    scene world(-gravity);
+    scene world;
     respond(world, world.add_floor(made_of), response);
     btRigidBody *ball = world.add_ball(btVector3(0, 1, 0), made_of);
     respond(world, ball, response);

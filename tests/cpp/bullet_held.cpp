@@ -4,26 +4,6 @@
 
 namespace {
 
-constexpr double gravity = 10.0;
-
-double energy_of(const btRigidBody &body, const btVector3 &velocity) {
-    const btVector3 turn = body.getAngularVelocity();
-    const btVector3 spin = body.getInvInertiaTensorWorld().inverse() * turn;
-    return 0.5 * double(velocity.length2() * body.getMass() + spin.dot(turn)) +
-           gravity * double(body.getMass() * body.getCenterOfMassPosition().y());
-}
-
-/// The sink of a ball of half a metre into a floor, both with a coat of half a metre, under a load: their equal
-/// pressures meet on a paraboloid.
-double sink_under(double stiffness, double load) {
-    double low = 0, high = 0.5;
-    for (int i = 0; i < 60; ++i) {
-        const double sink = 0.5 * (low + high);
-        (SIMD_PI * stiffness * (1 - sink) * sink * sink < load ? low : high) = sink;
-    }
-    return low;
-}
-
 /// What the coupler does about held bodies, undone.
 enum class told { as_it_is, never, not_even_guessed };
 
@@ -45,7 +25,7 @@ struct silently : rigid_bodies {
 /// A ball at the end of an arm on a hinge, with a load on it, on a coated floor.
 void arm(int ticks, double stiffness, btScalar heavy, told how) {
     const material made_of{stiffness, 0.0, 0.5};
-    scene_of<silently> world(-gravity);
+    scene_of<silently> world;
     world.add_floor(made_of);
     const btVector3 start(0, btScalar(0.5), 0);
     btRigidBody *ball = world.add_ball(start, made_of, 1);
@@ -101,7 +81,7 @@ void arm(int ticks, double stiffness, btScalar heavy, told how) {
 /// Links on joints swing against a wall, and come to rest against it.
 void pendulum(int ticks, double stiffness, bool hinges, int number) {
     const material made_of{stiffness, 0.2, 0.3};
-    scene world(-gravity);
+    scene world;
     world.add_coated(0, btVector3(0, 0, 0),
                      std::make_unique<btStaticPlaneShape>(btVector3(1, 0, 0), btScalar(-0.35)), made_of, 0.5);
     std::vector<btRigidBody *> links;
@@ -138,7 +118,7 @@ void pendulum(int ticks, double stiffness, bool hinges, int number) {
     const auto energy = [&] {
         double sum = 0;
         for (const btRigidBody *link : links) {
-            sum += energy_of(*link, link->getLinearVelocity());
+            sum += energy_of(*link);
         }
         return sum - lowest;
     };
@@ -176,7 +156,7 @@ void pendulum(int ticks, double stiffness, bool hinges, int number) {
 /// Coated boxes on each other by their coats, and on plain boxes by their shapes.
 void stack(int ticks, double stiffness, bool coats, bool sleep) {
     const material made_of{stiffness, 0.6, 0.5};
-    scene world(-gravity);
+    scene world;
     world.add_body(0, btVector3(0, 0, 0), std::make_unique<btStaticPlaneShape>(btVector3(0, 1, 0), btScalar(0)), false);
     std::vector<btRigidBody *> boxes;
     const bool coated[6] = {true, true, false, true, true, false};

@@ -14,8 +14,6 @@ struct multibodies {
     using coupler = isocoat::bullet::multibody_coupler;
 };
 
-constexpr double gravity = 10.0;
-
 /// A multibody, its colliders and their shapes.
 struct chain {
     scene_of<multibodies> &world;
@@ -91,21 +89,10 @@ struct chain {
     }
 };
 
-/// The sink of a ball of half a metre into a floor, both with a coat of half a metre, under a load: their equal
-/// pressures meet on a paraboloid.
-double sink_under(double stiffness, double load) {
-    double low = 0, high = 0.5;
-    for (int i = 0; i < 60; ++i) {
-        const double sink = 0.5 * (low + high);
-        (SIMD_PI * stiffness * (1 - sink) * sink * sink < load ? low : high) = sink;
-    }
-    return low;
-}
-
 /// A ball at the end of an arm with a load above it, on a coated floor.
 void arm(int ticks, double stiffness, double heavy, bool braked) {
     const material made_of{stiffness, 0.0, 0.5};
-    scene_of<multibodies> world(-gravity);
+    scene_of<multibodies> world;
     world.add_floor(made_of);
     chain arm(world, 2, 0, btVector3(-2, btScalar(0.5), 0), true);
     arm.body.setupRevolute(0, 1, chain::inertia_of(1), -1, btQuaternion::getIdentity(), btVector3(0, 0, 1),
@@ -154,7 +141,7 @@ constexpr double heavy = 5.0;
 /// A multibody that stands on two balls, with its load nearer to one of them.
 void feet(int ticks, double stiffness) {
     const material made_of{stiffness, 0.3, 0.5};
-    scene_of<multibodies> world(-gravity);
+    scene_of<multibodies> world;
     world.add_floor(made_of);
     // It cannot fall over: a rail holds its base in the plane.
     chain beam(world, 4, 1, btVector3(0, 1, 0), true);
@@ -221,7 +208,7 @@ void struck(int ticks) {
 /// Three links swing against a wall, and come to rest against it.
 void pendulum(int ticks, double stiffness, bool spherical) {
     const material made_of{stiffness, 0.2, 0.3};
-    scene_of<multibodies> world(-gravity);
+    scene_of<multibodies> world;
     world.add_coated(0, btVector3(0, 0, 0),
                      std::make_unique<btStaticPlaneShape>(btVector3(1, 0, 0), btScalar(-0.35)), made_of, 0.5);
     chain links(world, 3, 0, btVector3(0, 0, 0), true);

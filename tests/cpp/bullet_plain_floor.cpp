@@ -161,7 +161,7 @@ void damped() {
 
 /// A box that tumbles over coats: Bullet turns it with the gyroscopic torque or without.
 void tumbling(int flags, const char *name) {
-    scene world(-10);
+    scene world;
     const material made_of{5e4, 0.0, 0.0};
     world.add_floor(made_of);
     btRigidBody *body = world.add_coated(

@@ -37,6 +37,28 @@ inline int summary(const char *name) {
 
 inline void must(isocoat_status status) { isocoat::bullet::detail::check(status, "test"); }
 
+/// Of every scene that says nothing else, downwards [m/s²].
+constexpr double gravity = 10.0;
+
+/// What a body's motion and height come to [J].
+inline double energy_of(const btRigidBody &body) {
+    const btVector3 turn = body.getAngularVelocity();
+    const btVector3 spin = body.getInvInertiaTensorWorld().inverse() * turn;
+    return 0.5 * double(body.getLinearVelocity().length2() * body.getMass() + spin.dot(turn)) +
+           gravity * double(body.getMass() * body.getCenterOfMassPosition().y());
+}
+
+/// The sink of a ball of half a metre into a floor, both with a coat of half a metre, under a load: their equal
+/// pressures meet on a paraboloid.
+inline double sink_under(double stiffness, double load) {
+    double low = 0, high = 0.5;
+    for (int i = 0; i < 60; ++i) {
+        const double sink = 0.5 * (low + high);
+        (SIMD_PI * stiffness * (1 - sink) * sink * sink < load ? low : high) = sink;
+    }
+    return low;
+}
+
 /// What a coat is made of.
 struct material {
     double stiffness_scale = 2e4;
@@ -55,10 +77,10 @@ struct rigid_bodies {
 template <class kind>
 class scene_of {
 public:
-    explicit scene_of(double gravity = -10.0, isocoat_scheme scheme = ISOCOAT_SCHEME_AUTO)
+    explicit scene_of(double upwards = -gravity, isocoat_scheme scheme = ISOCOAT_SCHEME_AUTO)
         : dispatcher(&configuration),
           dynamics(std::make_unique<typename kind::world>(&dispatcher, &broadphase, &solver, &configuration)) {
-        dynamics->setGravity(btVector3(0, btScalar(gravity), 0));
+        dynamics->setGravity(btVector3(0, btScalar(upwards), 0));
         isocoat_world_desc desc = isocoat_world_desc_default();
         desc.scheme = scheme;
         must(isocoat_world_create(&desc, &coats));

@@ -42,7 +42,7 @@ std::vector<btRigidBody *> stack(scene &world) {
 }
 
 void stays_asleep(int ticks) {
-    scene world(-10, ISOCOAT_SCHEME_SEEDS);
+    scene world(-gravity, ISOCOAT_SCHEME_SEEDS);
     const std::vector<btRigidBody *> bodies = stack(world);
     bool together = false;
     const int frames = until_asleep(world, bodies, ticks, together);

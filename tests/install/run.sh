@@ -40,7 +40,7 @@ prefix=$WORK/package/opt/isocoat
 for file in lib/libisocoat.a "lib/libisocoat.so.$VERSION" lib/pkgconfig/isocoat.pc lib/pkgconfig/isocoat-static.pc \
     lib/cmake/isocoat/isocoat-config.cmake lib/cmake/isocoat/isocoat-config-version.cmake \
     include/isocoat/isocoat.h include/isocoat/isocoat.hpp include/isocoat/isocoat_bullet.hpp \
-    include/isocoat/isocoat_bullet_multibody.hpp \
+    include/isocoat/isocoat_bullet_bodies.hpp include/isocoat/isocoat_bullet_multibody.hpp \
     share/doc/isocoat/LICENSE-MIT share/doc/isocoat/LICENSE-APACHE; do
     [ -f "$prefix/$file" ] || die "$file was not installed"
 done
@@ -100,7 +100,7 @@ alone() { # header, compiler line
     for standard in c++17 c++20; do alone isocoat.hpp "$CXX" $cxx_flags -std=$standard -x c++; done
 }
 for precision in bullet bullet-float64; do
-    for header in isocoat_bullet.hpp isocoat_bullet_multibody.hpp; do
+    for header in isocoat_bullet.hpp isocoat_bullet_bodies.hpp isocoat_bullet_multibody.hpp; do
         # shellcheck disable=SC2046,SC2086
         alone "$header" "$CXX" $cxx_flags $($PKG_CONFIG --cflags $precision | sed 's/-I/-isystem /g') -x c++
     done

@@ -2,7 +2,7 @@
 
 use isocoat::world::{Response, Scheme};
 
-use super::scenes::{Errors, Record, Scene, Settings};
+use super::sim::{Errors, Record, Scene, Settings};
 
 /// A scene run with some settings.
 #[derive(Clone, Debug)]

@@ -13,6 +13,7 @@ mod pareto;
 mod plot;
 mod query;
 mod scenes;
+mod sim;
 
 use isocoat::world::Response;
 
@@ -20,7 +21,7 @@ use common::Random;
 
 use grid::Compared;
 use page::Measured;
-use scenes::Settings;
+use sim::Settings;
 
 /// What is worth choosing is better than all else in something; nothing else is.
 #[test]
@@ -52,8 +53,8 @@ fn the_front_is_what_nothing_beats() {
 #[test]
 fn every_row_of_the_data_has_the_columns_of_its_head() {
     let columns = |line: &str| line.split(',').count();
-    let errors = scenes::Errors { path: 0.1, energy: f64::INFINITY, gain: 0.0, rest: None };
-    for result in [None, Some((1e-3, errors)), Some((1e-3, scenes::Errors { rest: Some(0.5), ..errors }))] {
+    let errors = sim::Errors { path: 0.1, energy: f64::INFINITY, gain: 0.0, rest: None };
+    for result in [None, Some((1e-3, errors)), Some((1e-3, sim::Errors { rest: Some(0.5), ..errors }))] {
         let run = grid::Run { scene: 0, settings: Settings::default(), result };
         assert_eq!(columns(&page::motion_row("scene", &run, true)), columns(page::MOTION));
     }
@@ -78,7 +79,7 @@ fn half_the_sub_step_has_a_quarter_of_the_error() {
 const BUDGET: f64 = 4e-3;
 
 #[test]
-#[ignore = "takes minutes; make trade"]
+#[ignore = "takes minutes: make trade"]
 fn the_whole_grid() {
     let begin = clock::cpu_seconds();
     let done = |what: &str| println!("{:6.1} s  {what}", clock::cpu_seconds() - begin);

@@ -10,7 +10,7 @@ use super::grid::{Compared, Run};
 use super::pareto::{front, quickest};
 use super::plot::{self, Axis, Curve, Panel};
 use super::query::{Blended, Cost};
-use super::scenes::{Errors, Settings, scheme_name};
+use super::sim::{Errors, Settings, scheme_name};
 
 /// All that one run measured.
 pub struct Measured {

@@ -7,7 +7,7 @@ use isocoat::world::{BodyId, Scheme, World, WorldDesc};
 use super::clock::time_of;
 use super::common::oracle::Oracle;
 use super::common::{Coat, Random, total};
-use super::scenes::{Record, Scene, Settings, Sim};
+use super::sim::{Record, Scene, Settings, Sim};
 
 /// What a scheme costs, and what its forces are worth.
 #[derive(Clone, Copy, Debug)]
@@ -40,7 +40,7 @@ pub fn schemes() -> Vec<Settings> {
 /// Frames of a record in which something touches, few enough to be queried in many ways.
 fn touching(scene: &Scene, record: &Record) -> Vec<usize> {
     let mut sim = scene.sim(&Settings::default());
-    let compared = (scene.horizon / super::scenes::FRAME) as usize;
+    let compared = (scene.horizon / super::sim::FRAME) as usize;
     let touches = |frame: &usize| {
         sim.place(&record.frames[*frame]);
         let pairs = sim.pairs();
@@ -85,7 +85,7 @@ fn measure(sim: &Sim, pair: [usize; 2], settings: &Settings, truth: (Vec3, Vec3)
     Cost {
         force: off,
         worst: off,
-        torque: (torque - truth.1).norm() / (scale * super::scenes::RADIUS),
+        torque: (torque - truth.1).norm() / (scale * super::sim::RADIUS),
         evaluations: query().iter().map(|contact| f64::from(contact.evaluations)).sum(),
         time: time_of(query),
     }
