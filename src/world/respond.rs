@@ -10,7 +10,7 @@ use crate::contact::candidate::Candidate;
 use crate::contact::surface;
 use crate::contact::tally::Tally;
 use crate::math::Wrench;
-use crate::response::substep::{Island, Work};
+use crate::response::substep::{Island, Step, Work};
 use crate::response::{Response, explicit, implicit, substepped};
 use crate::team::Team;
 
@@ -49,40 +49,40 @@ impl Rules {
         solver: &mut implicit::Solver,
         team: &Team,
     ) {
-        let Self { dt, settings, limits, effort } = self;
-        let island = &group.island;
-        group.driven.clear();
+        let dt = self.dt;
+        let Group { island, response, substeps, supports, driven, carried, outcome, .. } = group;
+        driven.clear();
         for link in &island.links {
             let motion = &motions[*link as usize];
             if !motion.is_movable() {
-                group.driven.push((*link, (motion.center, motion.rotation)));
+                driven.push((*link, (motion.center, motion.rotation)));
             }
         }
         // What leans on it elsewhere is added up in the order of the islands, whoever steps them.
-        for link in &group.supports {
+        for link in supports.iter() {
             motions[*link as usize].contact_impulse = Wrench::default();
         }
-        group.outcome = match group.response {
+        let mut step = Step { motions, island, candidates, settings: &self.settings, work, team };
+        *outcome = match response {
             Response::Explicit => {
-                explicit::step(motions, island, candidates, *dt, settings, work, team);
+                explicit::step(&mut step, dt);
                 Outcome { substeps: 1, ..Outcome::default() }
             }
             Response::Implicit => {
-                implicit::step(motions, island, candidates, *dt, settings, effort, solver, work, team);
+                implicit::step(&mut step, dt, &self.effort, solver);
                 Outcome { rounds: solver.rounds, splits: solver.splits, ..Outcome::default() }
             }
             Response::Auto | Response::Substepped => {
-                let wanted = group.substeps;
-                let substeps = substepped::step(motions, island, candidates, *dt, settings, limits, wanted, work, team);
+                let substeps = substepped::step(&mut step, dt, &self.limits, *substeps);
                 Outcome { substeps, ..Outcome::default() }
             }
         };
         // Links that the host moves whatever happens start every island from the host's pose.
-        for (link, pose) in group.driven.iter() {
+        for (link, pose) in driven.iter() {
             (motions[*link as usize].center, motions[*link as usize].rotation) = *pose;
         }
-        group.carried.clear();
-        group.carried.extend(group.supports.iter().map(|link| motions[*link as usize].contact_impulse));
+        carried.clear();
+        carried.extend(supports.iter().map(|link| motions[*link as usize].contact_impulse));
     }
 }
 
