@@ -4,6 +4,7 @@
 use super::pair::{Pair, Side};
 use super::patch::{self, Node, Sums};
 use crate::base::Motion;
+use crate::field::{Placed, blend};
 use crate::math::{Vec3, Wrench};
 
 /// How the surfaces of two bodies rub and damp.
@@ -51,13 +52,21 @@ fn share(side: &Side, position: &Vec3, out: &mut Vec<Share>) {
         return;
     }
     let mut total = 0.0;
-    for (skeleton, link) in side.skeletons.iter().zip(&side.links) {
-        let weight = skeleton.value(position);
+    // Whose field has no part in the body's there, has none in the load, and must not be tied to it.
+    blend::parts(&side.skeletons, &side.graph, position, |index, weight| {
+        let link = side.links[index];
         total += weight;
-        match out.iter_mut().find(|share| share.link == *link) {
+        match out.iter_mut().find(|share| share.link == link) {
             Some(share) => share.weight += weight,
-            None => out.push(Share { link: *link, weight }),
+            None => out.push(Share { link, weight }),
         }
+    });
+    if total == 0.0 {
+        // Beyond all fields it is the nearest coat's.
+        let gap = |skeleton: &Placed| skeleton.shape.closest(position).distance - skeleton.profile.thickness;
+        let nearest = side.skeletons.iter().zip(&side.links).min_by(|a, b| gap(a.0).total_cmp(&gap(b.0)));
+        out.extend(nearest.map(|(_, link)| Share { link: *link, weight: 1.0 }));
+        return;
     }
     for share in out.iter_mut() {
         share.weight /= total;

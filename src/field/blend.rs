@@ -22,6 +22,25 @@ thread_local! {
     static SCRATCH: RefCell<Scratch> = RefCell::default();
 }
 
+/// Tells `part` which skeletons make the field at a point, and how much of it each: `f_i ∂f/∂f_i`.
+pub fn parts(skeletons: &[Placed], graph: &Graph, p: &Vec3, mut part: impl FnMut(usize, f64)) {
+    let fields = skeletons.iter().enumerate().map(|(index, skeleton)| (index, skeleton.value(p)));
+    let mut fields = fields.filter(|(_, value)| *value != 0.0);
+    if graph.is_complete() {
+        return fields.for_each(|(index, value)| part(index, value));
+    }
+    SCRATCH.with_borrow_mut(|Scratch { active, work, .. }| {
+        active.clear();
+        active.extend(&mut fields);
+        graph.combine(active, Order::Slopes, work);
+        for ((index, value), slope) in active.iter().zip(&work.slopes) {
+            if *slope > 0.0 {
+                part(*index, value * slope);
+            }
+        }
+    });
+}
+
 /// Field value of all skeletons together.
 pub fn value(skeletons: &[Placed], graph: &Graph, p: &Vec3) -> f64 {
     let each = skeletons.iter().enumerate().map(|(index, skeleton)| (index, skeleton.value(p)));
