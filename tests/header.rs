@@ -25,6 +25,7 @@ const SECTIONS: &[(&str, &str)] = &[
     ("report", "What a step reports"),
     ("snapshot", "Snapshots"),
     ("query", "Queries"),
+    ("volume", "Volumes"),
     ("draw", "Debug drawing"),
 ];
 

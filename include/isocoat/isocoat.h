@@ -557,6 +557,11 @@ typedef struct isocoat_body_desc {
     uint32_t may_sleep;
     /** 0. */
     uint32_t reserved;
+    /**
+     * Volume control: share of each skeleton's error in volume that a step takes back, from 0 (off) to 0.5, which is
+     * the best for most. See isocoat_skeleton_set_target_volume(). Default 0.
+     */
+    double volume_gain;
 } isocoat_body_desc;
 
 /**
@@ -1825,6 +1830,83 @@ isocoat_status isocoat_skeleton_get_seeds(const isocoat_world *world,
                                           uint8_t *valid,
                                           size_t capacity,
                                           size_t *count);
+
+/* ---- Volumes ----------------------------------------------------------------------------------------------------- */
+
+/**
+ * The volume of a body's solid now: that of the territories of its enabled skeletons, by their seeds. Also for bodies
+ * without volume control. Contacts do not count.
+ *
+ * - world: not NULL.
+ * - body: the body.
+ * - volume: receives the volume, in m^3; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, UNSUPPORTED (a plane has no bounds). Threads: reads the world.
+ */
+ISOCOAT_MUST_USE isocoat_status isocoat_body_get_volume(const isocoat_world *world, isocoat_body body, double *volume);
+
+/**
+ * The volume of a skeleton's territory now, by its seeds: the part of its body's solid where its field is the highest.
+ * Also without volume control. 0 while the skeleton or its link is disabled. Contacts do not count.
+ *
+ * - world: not NULL.
+ * - skeleton: the skeleton.
+ * - volume: receives the volume, in m^3; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, UNSUPPORTED (a plane has no bounds). Threads: reads the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_skeleton_get_volume(const isocoat_world *world,
+                                           isocoat_skeleton skeleton,
+                                           double *volume);
+
+/**
+ * The volume that volume control aims at for a skeleton: what its territory had in the first step with control, or
+ * what the host has set. Before that step, what it has now. A change of its descriptor begins anew, unless only
+ * user_data changes.
+ *
+ * - world: not NULL.
+ * - skeleton: the skeleton.
+ * - target: receives the volume, in m^3; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, UNSUPPORTED (a plane; the volume_gain of its body is 0).
+ * Threads: reads the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_skeleton_get_target_volume(const isocoat_world *world,
+                                                  isocoat_skeleton skeleton,
+                                                  double *target);
+
+/**
+ * Sets the volume that volume control aims at for a skeleton: a muscle that flexes. The surface moves by at most a
+ * tenth of the skeleton's thickness in a step, and by at most half of it inwards and all of it outwards in all.
+ *
+ * - world: not NULL.
+ * - skeleton: the skeleton.
+ * - target: the volume, in m^3, > 0 and at most 1e30.
+ *
+ * Errors: INVALID_HANDLE, OUT_OF_RANGE, UNSUPPORTED (a plane; the volume_gain of its body is 0).
+ * Threads: changes the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_skeleton_set_target_volume(isocoat_world *world,
+                                                  isocoat_skeleton skeleton,
+                                                  double target);
+
+/**
+ * How far volume control has moved a skeleton's surface outwards: its thickness and radius are larger by so much than
+ * its descriptor says. 0 without volume control.
+ *
+ * - world: not NULL.
+ * - skeleton: the skeleton.
+ * - offset: receives the distance, in m; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_skeleton_get_offset(const isocoat_world *world,
+                                           isocoat_skeleton skeleton,
+                                           double *offset);
 
 /* ---- Debug drawing ----------------------------------------------------------------------------------------------- */
 

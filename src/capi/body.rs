@@ -75,6 +75,9 @@ pub struct isocoat_body_desc {
     pub may_sleep: u32,
     /// 0.
     pub reserved: u32,
+    /// Volume control: share of each skeleton's error in volume that a step takes back, from 0 (off) to 0.5, which is
+    /// the best for most. See isocoat_skeleton_set_target_volume(). Default 0.
+    pub volume_gain: f64,
 }
 
 // SAFETY: `repr(C)`, the size first, numbers and a pointer that is never followed.
@@ -120,6 +123,7 @@ impl From<&BodyDesc> for isocoat_body_desc {
             damping_ratio,
             may_sleep: desc.may_sleep.into(),
             reserved: 0,
+            volume_gain: desc.volume_gain,
         }
     }
 }
@@ -152,6 +156,7 @@ impl isocoat_body_desc {
             user_data: self.user_data as usize,
             response: response_from_c(self.response)?,
             may_sleep: flag("may_sleep", self.may_sleep)?,
+            volume_gain: self.volume_gain,
         })
     }
 }

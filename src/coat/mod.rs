@@ -1,11 +1,12 @@
 //! The coat: the implicit layer of one body, in one frame.
 //!
 //! [`seeds`] sends fixed rays from each skeleton; [`territory`] follows them to the coat's surface or to the border of
-//! another skeleton's territory.
+//! another skeleton's territory; [`volume`] measures what they enclose, and keeps it.
 
 pub mod root;
 pub mod seeds;
 pub mod territory;
+pub mod volume;
 
 use crate::field::{Placed, Profile, Shape, blend};
 use crate::math::{Pose, Vec3};

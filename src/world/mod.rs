@@ -14,6 +14,7 @@ mod sleep;
 mod snapshot;
 mod step;
 mod units;
+mod volume;
 
 use crate::handle::{Arena, Noun, WorldTag};
 pub use desc::{
@@ -43,6 +44,8 @@ pub struct Body {
     /// What has been said about its units since its last change.
     pub(crate) units: units::Said,
     sleep: sleep::Sleep,
+    /// Only with volume control.
+    volume: Option<Box<volume::Control>>,
 }
 
 /// A link as the world keeps it.
@@ -70,6 +73,10 @@ pub struct Skeleton {
     pub(crate) profile: Profile,
     pub(crate) link: u32,
     pub(crate) enabled: bool,
+    /// How far volume control has moved its surface outwards \[m\]; `profile` has it in it.
+    pub(crate) offset: f64,
+    /// The volume that volume control aims at \[m³\]; none before its first look.
+    pub(crate) target: Option<f64>,
     /// How far from it the body's surface may lie.
     pub(crate) reach: f64,
     /// Its rays, and the count they were made for; made at the first use.
@@ -152,12 +159,13 @@ impl World {
     /// Changes the settings, from the next step on.
     pub fn set_desc(&mut self, desc: WorldDesc) -> Result<()> {
         desc.validate()?;
-        let gravity_changes = desc.gravity != self.desc.gravity;
+        // What is worked out about bodies depends on these two.
+        let changes = desc.gravity != self.desc.gravity || desc.seed_count != self.desc.seed_count;
         if desc != self.desc {
             self.rouse_all();
         }
         self.desc = desc;
-        if gravity_changes {
+        if changes {
             for index in 0..self.bodies.capacity() {
                 if self.bodies.is_live(index) {
                     self.refresh(index);
@@ -202,6 +210,7 @@ impl World {
             stacked: 0,
             units: units::Said::default(),
             sleep: sleep::Sleep::default(),
+            volume: None,
         })
     }
 
@@ -238,12 +247,16 @@ impl World {
             }
             for skeleton in skeletons().copied().collect::<Vec<_>>() {
                 let skeleton = &mut self.skeletons[skeleton as usize];
-                skeleton.profile = skeleton.desc.profile(desc.isovalue)?;
+                skeleton.profile = skeleton.desc.profile(desc.isovalue)?.inflated(skeleton.offset);
                 skeleton.rays = Default::default();
             }
         }
         let body = self.bodies.get_mut(id)?;
+        let switched = (desc.volume_gain > 0.0) != (body.desc.volume_gain > 0.0);
         body.desc = desc;
+        if switched {
+            self.reset_volumes(id.index());
+        }
         self.refresh(id.index());
         Ok(())
     }
@@ -360,21 +373,31 @@ impl World {
     /// Brings what is derived from a body's parts up to date after a change of any of them.
     fn refresh(&mut self, slot: usize) {
         self.rouse(slot as u32);
+        self.unsettle(slot);
         self.bodies[slot].units = units::Said::default();
         self.measure(slot);
     }
 
     /// Works out what follows from the descriptors of a body and its parts.
     fn measure(&mut self, slot: usize) {
-        let body = &self.bodies[slot];
-        let skeletons: Vec<u32> = self.skeletons_of(body).map(|(_, index, _)| index).collect();
-        for index in &skeletons {
-            let skeleton = &mut self.skeletons[*index as usize];
-            skeleton.reach = crate::field::blend::reach(&skeleton.profile, skeletons.len());
-        }
-        let derived = units::derive(self, body);
+        self.measure_reach(slot);
+        let derived = units::derive(self, &self.bodies[slot]);
         let body = &mut self.bodies[slot];
         (body.stiffness_scale, body.dissipation) = derived;
+    }
+
+    /// How far the surface of a body may lie from its skeletons.
+    fn measure_reach(&mut self, slot: usize) {
+        let body = &self.bodies[slot];
+        let count = self.skeletons_of(body).count();
+        for link in body.links.iter().map(|link| &self.links[*link as usize]).filter(|link| link.enabled) {
+            for index in &link.skeletons {
+                let skeleton = &mut self.skeletons[*index as usize];
+                if skeleton.enabled {
+                    skeleton.reach = crate::field::blend::reach(&skeleton.profile, count);
+                }
+            }
+        }
     }
 
     /// Creates a skeleton of a link. A plane needs a link of kind fixed.
@@ -385,6 +408,8 @@ impl World {
             profile,
             link: link.raw.index,
             enabled: true,
+            offset: 0.0,
+            target: None,
             reach: profile.thickness,
             rays: Default::default(),
         })?;
@@ -417,7 +442,8 @@ impl World {
         Ok(&self.skeletons.get(id)?.desc)
     }
 
-    /// The field profile of a skeleton, with the stiffness and radius that stand for zeros in its descriptor.
+    /// The field profile of a skeleton, with the stiffness and radius that stand for zeros in its descriptor, as volume
+    /// control has moved it.
     pub fn skeleton_profile(&self, id: SkeletonId) -> Result<&Profile> {
         Ok(&self.skeletons.get(id)?.profile)
     }
@@ -427,7 +453,11 @@ impl World {
         let link = self.links.id_of(self.skeletons.get(id)?.link as usize);
         let profile = self.check_skeleton(link, &desc)?;
         let skeleton = self.skeletons.get_mut(id)?;
-        (skeleton.desc, skeleton.profile, skeleton.rays) = (desc, profile, Default::default());
+        if desc != (SkeletonDesc { user_data: desc.user_data, ..skeleton.desc.clone() }) {
+            (skeleton.offset, skeleton.target) = (0.0, None);
+        }
+        skeleton.profile = profile.inflated(skeleton.offset);
+        (skeleton.desc, skeleton.rays) = (desc, Default::default());
         let body = self.links.get(link)?.body as usize;
         self.refresh(body);
         Ok(())

@@ -22,6 +22,7 @@ use super::{
     desc, step, units::Said,
 };
 use crate::base::Kind;
+use crate::coat::volume::OFFSETS;
 use crate::contact::Scheme;
 use crate::contact::candidate::Memory;
 use crate::contact::friction::Bristle;
@@ -34,7 +35,7 @@ use crate::response::{Response, VelocityConvention};
 use crate::team::Alone;
 
 /// What the lists below say. Another number is refused: no snapshot is ever half understood.
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
 const MAGIC: [u8; 8] = *b"isocoat\0";
 /// Offsets of the parts of the header.
 const FORMAT_AT: usize = 8;
@@ -61,7 +62,7 @@ structs! {
     }
     BodyDesc {
         rigid, response, isovalue, stiffness_scale, stiffness, friction, static_friction, viscous_friction, dissipation,
-        category, mask, may_sleep, user_data,
+        category, mask, may_sleep, volume_gain, user_data,
     }
     LinkDesc {
         kind, pose, twist, mass, local_center, inertia, gravity_scale, external_acceleration,
@@ -70,12 +71,12 @@ structs! {
     }
     SkeletonDesc { shape, thickness, stiffness, stiffening, radius, seed_count, user_data }
     // What the descriptor comes to follows from the parts.
-    Body { desc, links, enabled, stacked, units, sleep; stiffness_scale: 0.0, dissipation: 0.0 }
+    Body { desc, links, enabled, stacked, units, sleep; stiffness_scale: 0.0, dissipation: 0.0, volume: None }
     Link {
         desc, body, skeletons, enabled, applied_force, applied_impulse, contact_impulse, host_impulse, last_dt, mirror,
     }
     // The profile and the reach follow from the descriptors; the rays are made at their first use.
-    Skeleton { desc, link, enabled; profile: NO_PROFILE, reach: 0.0, rays: Default::default() }
+    Skeleton { desc, link, enabled, offset, target; profile: NO_PROFILE, reach: 0.0, rays: Default::default() }
     Said { sink, travel }
     Sleep { quiet, group }
     Mirror {
@@ -369,6 +370,11 @@ impl World {
         for index in self.links.indices() {
             check_link(&self.links[index]).map_err(|error| refused(format_args!("link {index}"), error))?;
         }
+        for index in self.skeletons.indices() {
+            let skeleton = &self.skeletons[index];
+            let controlled = self.bodies[self.links[skeleton.link as usize].body as usize].desc.volume_gain > 0.0;
+            check_skeleton(skeleton, controlled).map_err(|error| refused(format_args!("skeleton {index}"), error))?;
+        }
         Ok(())
     }
 
@@ -382,7 +388,8 @@ impl World {
                 check_plane(&skeleton.desc, link.desc.kind)?;
                 Ok(profile)
             });
-            skeleton.profile = profile.map_err(|error| refused(format_args!("skeleton {index}"), error))?;
+            let profile = profile.map_err(|error| refused(format_args!("skeleton {index}"), error))?;
+            skeleton.profile = profile.inflated(skeleton.offset);
             skeleton.reach = skeleton.profile.thickness;
         }
         for body in 0..self.bodies.capacity() {
@@ -561,6 +568,18 @@ fn check_link(link: &Link) -> Result<()> {
     }
     require("commanded change of velocity", *commanded, "finite and at least 0", |x| x >= 0.0)?;
     desc::validate_pose(&Pose { position: *expected_center, rotation: *expected_rotation })
+}
+
+/// Only volume control has offsets and targets.
+fn check_skeleton(skeleton: &Skeleton, controlled: bool) -> Result<()> {
+    let Skeleton { desc, link: _, enabled: _, offset, target, profile: _, reach: _, rays: _ } = skeleton;
+    let (low, high) = OFFSETS;
+    require("offset", *offset, "from -0.5 to 1 thickness, and 0 without volume control", |x| {
+        x == 0.0 || controlled && (low * desc.thickness..=high * desc.thickness).contains(&x)
+    })?;
+    target.map_or(Ok(()), |target| {
+        require("target volume", target, "at least 0, and none without volume control", |x| controlled && x >= 0.0)
+    })
 }
 
 /// Equal in every bit: zeros of different signs are not the same.
