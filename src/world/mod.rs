@@ -127,6 +127,8 @@ pub struct World {
     log: Alone<Option<Log>>,
     pair_filter: Alone<Option<PairFilter>>,
     tasks: Alone<Option<Box<dyn Tasks>>>,
+    /// A body has volume control, or has had it: without any, steps need not look.
+    controls_volumes: bool,
     stepping: step::Stepping,
 }
 
@@ -147,6 +149,7 @@ impl World {
             log: Alone::default(),
             pair_filter: Alone::default(),
             tasks: Alone::default(),
+            controls_volumes: false,
             stepping: step::Stepping::default(),
         })
     }
@@ -201,6 +204,7 @@ impl World {
     pub fn create_body(&mut self, desc: BodyDesc) -> Result<BodyId> {
         desc.validate()?;
         let (stiffness_scale, dissipation) = (desc.stiffness_scale, desc.dissipation);
+        self.controls_volumes |= desc.volume_gain > 0.0;
         self.bodies.insert(Body {
             desc,
             links: Vec::new(),
@@ -251,6 +255,7 @@ impl World {
                 skeleton.rays = Default::default();
             }
         }
+        self.controls_volumes |= desc.volume_gain > 0.0;
         let body = self.bodies.get_mut(id)?;
         let switched = (desc.volume_gain > 0.0) != (body.desc.volume_gain > 0.0);
         body.desc = desc;

@@ -267,8 +267,19 @@ impl World {
     }
 
     fn write(&self, out: &mut impl Sink) {
-        let Self { desc, origin, own_tag: _, bodies, links, skeletons, log: _, pair_filter: _, tasks: _, stepping } =
-            self;
+        let Self {
+            desc,
+            origin,
+            own_tag: _,
+            bodies,
+            links,
+            skeletons,
+            log: _,
+            pair_filter: _,
+            tasks: _,
+            controls_volumes: _,
+            stepping,
+        } = self;
         origin.write(out);
         desc.write(out);
         write_arena(bodies, out);
@@ -306,6 +317,7 @@ impl World {
             log: Alone::default(),
             pair_filter: Alone::default(),
             tasks: Alone::default(),
+            controls_volumes: false,
             stepping: step::Stepping::default(),
         };
         let mut memories: Vec<Memory> = from.read("pairs of bodies")?;
@@ -344,8 +356,21 @@ impl World {
             skeletons.iter_mut().for_each(|id| id.raw.world = tag);
         }
         fresh.take_rays_of(self);
-        let World { desc, origin, own_tag: _, bodies, links, skeletons, log: _, pair_filter: _, tasks: _, stepping: _ } =
-            fresh;
+        fresh.controls_volumes = fresh.bodies.indices().any(|body| fresh.bodies[body].desc.volume_gain > 0.0);
+        let World {
+            desc,
+            origin,
+            own_tag: _,
+            bodies,
+            links,
+            skeletons,
+            log: _,
+            pair_filter: _,
+            tasks: _,
+            controls_volumes,
+            stepping: _,
+        } = fresh;
+        self.controls_volumes = controls_volumes;
         (self.desc, self.origin) = (desc, origin);
         (self.bodies, self.links, self.skeletons) = (bodies, links, skeletons);
         self.stepping.restart(memories, resting, contacts);

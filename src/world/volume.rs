@@ -43,6 +43,9 @@ fn relative_poses<'a>(world: &'a World, body: &'a Body) -> impl Iterator<Item = 
 impl World {
     /// Moves the offsets of all bodies with volume control that are awake.
     pub(super) fn control_volumes(&mut self, state: &mut Stepping, team: &Team) {
+        if !self.controls_volumes {
+            return;
+        }
         for index in 0..self.bodies.capacity() {
             let Some(body) = self.bodies.at_mut(index) else { continue };
             if body.desc.volume_gain > 0.0 && body.enabled && !body.is_asleep() {
