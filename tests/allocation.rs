@@ -10,7 +10,7 @@ use common::{Coat, ball_inertia, box_inertia};
 use isocoat::base::Kind;
 use isocoat::field::Shape;
 use isocoat::math::{Pose, Vec3};
-use isocoat::world::{BodyDesc, LinkDesc, Scheme, World, WorldDesc};
+use isocoat::world::{BodyDesc, LinkDesc, LinkState, Scheme, SkeletonDesc, World, WorldDesc};
 
 thread_local! {
     static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
@@ -135,6 +135,33 @@ fn steps_with_helpers_and_steps_of_sleepers_allocate_nothing() {
     let desc = WorldDesc { sleep_time: 0.1, sleep_speed: 1.0, ..asleep.desc().clone() };
     asleep.set_desc(desc).unwrap();
     assert_eq!(allocations(asleep, 4), 0);
+}
+
+/// Two links that draw near each other, with volume control: every step measures and moves offsets.
+#[test]
+fn steps_with_volume_control_allocate_nothing() {
+    let mut world = World::new(WorldDesc::default()).unwrap();
+    let body = world.create_body(BodyDesc { volume_gain: 0.5, ..BodyDesc::default() }).unwrap();
+    let links = [0, 1].map(|_| {
+        let link = world.create_link(body, LinkDesc { kind: Kind::Host, ..LinkDesc::default() }).unwrap();
+        for x in [0.0, 0.1] {
+            let shape = Shape::Point(Vec3::new(x, 0.0, 0.0));
+            world.create_skeleton(link, SkeletonDesc { shape, ..SkeletonDesc::default() }).unwrap();
+        }
+        link
+    });
+    let skeleton = world.link_skeletons(links[0]).unwrap().next().unwrap();
+    let mut go = |steps: std::ops::Range<u32>| {
+        let (before, offset) = (ALLOCATIONS.get(), world.skeleton_offset(skeleton).unwrap());
+        for step in steps {
+            let pose = Pose::at(0.0, 0.0, 0.3 - 0.002 * f64::from(step));
+            world.set_link_state(links[1], &LinkState { pose, ..LinkState::default() }).unwrap();
+            world.step(1.0 / 60.0).unwrap();
+        }
+        (ALLOCATIONS.get() - before, world.skeleton_offset(skeleton).unwrap() != offset)
+    };
+    go(0..60);
+    assert_eq!(go(60..120), (0, true));
 }
 
 #[test]

@@ -26,6 +26,7 @@ const SECTIONS: &[(&str, &str)] = &[
     ("report", "What a step reports"),
     ("snapshot", "Snapshots"),
     ("query", "Queries"),
+    ("volume", "Volumes"),
     ("draw", "Debug drawing"),
 ];
 

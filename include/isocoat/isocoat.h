@@ -558,14 +558,10 @@ typedef struct isocoat_body_desc {
     /** 0. */
     uint32_t reserved;
     /**
-     * Width of the band in which the fields of groups that don't blend go over into each other, over the isovalue, from
-     * 0 to 0.5; 0 leaves a crease. Only for bodies with a blend graph. Default 0.05.
+     * Volume control: share of each skeleton's error in volume that a step takes back, from 0 (off) to 0.5, which is
+     * the best for most. See isocoat_skeleton_set_target_volume(). Default 0.
      */
-    double blend_band;
-    /** 1 if its parts that don't blend collide, when they are of different links, else 0. Default 1. */
-    uint32_t self_contact;
-    /** 0. */
-    uint32_t reserved_2;
+    double volume_gain;
 } isocoat_body_desc;
 
 /**
@@ -1108,86 +1104,6 @@ ISOCOAT_MUST_USE
 isocoat_status isocoat_skeleton_get_link(const isocoat_world *world,
                                          isocoat_skeleton skeleton,
                                          isocoat_link *link);
-
-/* ---- Blend graphs ------------------------------------------------------------------------------------------------ */
-
-/**
- * Sets how much two skeletons of a body blend: 1 adds their fields, with 0 the larger counts. New bodies blend all
- * over. Skeletons of different links collide, as far as they don't blend, if isocoat_body_desc::self_contact is 1; but
- * not in the territory of a third that blends with both.
- *
- * - world: not NULL.
- * - a, b: two skeletons of one body.
- * - weight: from 0 to 1.
- * - duration: time that the change takes, in s; 0 for at once.
- *
- * Errors: INVALID_HANDLE, OUT_OF_RANGE, UNSUPPORTED (skeletons of two bodies; the same skeleton; a graph with more than
- * 4096 groups of skeletons that all blend). Threads: changes the world.
- */
-ISOCOAT_MUST_USE
-isocoat_status isocoat_skeleton_set_blend(isocoat_world *world,
-                                          isocoat_skeleton a,
-                                          isocoat_skeleton b,
-                                          double weight,
-                                          double duration);
-
-/**
- * How much two skeletons of a body blend now.
- *
- * - world: not NULL.
- * - a, b: two skeletons of one body.
- * - weight: receives the weight, from 0 to 1; not NULL.
- *
- * Errors: INVALID_HANDLE, INVALID_ARGUMENT, UNSUPPORTED. Threads: reads the world.
- */
-ISOCOAT_MUST_USE
-isocoat_status isocoat_skeleton_get_blend(const isocoat_world *world,
-                                          isocoat_skeleton a,
-                                          isocoat_skeleton b,
-                                          double *weight);
-
-/**
- * Lets exactly those skeletons of a body blend that are of the same link, or of two links that are joined; also those
- * created later. Weights set before are forgotten.
- *
- * - world: not NULL.
- * - body: the body.
- * - joints: 2 handles a joint, links of the body; not NULL unless count is 0.
- * - count: number of joints.
- *
- * Errors: INVALID_HANDLE, INVALID_ARGUMENT, UNSUPPORTED (a link of another body; a link joined to itself; a graph with
- * more than 4096 groups of skeletons that all blend). Threads: changes the world.
- */
-ISOCOAT_MUST_USE
-isocoat_status isocoat_body_blend_neighbours(isocoat_world *world,
-                                             isocoat_body body,
-                                             const isocoat_link *joints,
-                                             size_t count);
-
-/**
- * Lets all skeletons of a body blend, as in the beginning.
- *
- * - world: not NULL.
- * - body: the body.
- *
- * Errors: INVALID_HANDLE. Threads: changes the world.
- */
-ISOCOAT_MUST_USE isocoat_status isocoat_body_blend_all(isocoat_world *world, isocoat_body body);
-
-/**
- * Says whether two skeletons of a body may collide where they don't blend; they may, unless told otherwise.
- *
- * - world: not NULL.
- * - a, b: two skeletons of one body.
- * - enabled: whether they may collide.
- *
- * Errors: INVALID_HANDLE, UNSUPPORTED. Threads: changes the world.
- */
-ISOCOAT_MUST_USE
-isocoat_status isocoat_skeleton_set_pair_contact(isocoat_world *world,
-                                                 isocoat_skeleton a,
-                                                 isocoat_skeleton b,
-                                                 bool enabled);
 
 /* ---- Motion of one link ------------------------------------------------------------------------------------------ */
 
@@ -1914,6 +1830,83 @@ isocoat_status isocoat_skeleton_get_seeds(const isocoat_world *world,
                                           uint8_t *valid,
                                           size_t capacity,
                                           size_t *count);
+
+/* ---- Volumes ----------------------------------------------------------------------------------------------------- */
+
+/**
+ * The volume of a body's solid now: that of the territories of its enabled skeletons, by their seeds. Also for bodies
+ * without volume control. Contacts do not count.
+ *
+ * - world: not NULL.
+ * - body: the body.
+ * - volume: receives the volume, in m^3; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, UNSUPPORTED (a plane has no bounds). Threads: reads the world.
+ */
+ISOCOAT_MUST_USE isocoat_status isocoat_body_get_volume(const isocoat_world *world, isocoat_body body, double *volume);
+
+/**
+ * The volume of a skeleton's territory now, by its seeds: the part of its body's solid where its field is the highest.
+ * Also without volume control. 0 while the skeleton or its link is disabled. Contacts do not count.
+ *
+ * - world: not NULL.
+ * - skeleton: the skeleton.
+ * - volume: receives the volume, in m^3; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, UNSUPPORTED (a plane has no bounds). Threads: reads the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_skeleton_get_volume(const isocoat_world *world,
+                                           isocoat_skeleton skeleton,
+                                           double *volume);
+
+/**
+ * The volume that volume control aims at for a skeleton: what its territory had in the first step with control, or
+ * what the host has set. Before that step, what it has now. A change of its descriptor begins anew, unless only
+ * user_data changes.
+ *
+ * - world: not NULL.
+ * - skeleton: the skeleton.
+ * - target: receives the volume, in m^3; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, UNSUPPORTED (a plane; the volume_gain of its body is 0).
+ * Threads: reads the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_skeleton_get_target_volume(const isocoat_world *world,
+                                                  isocoat_skeleton skeleton,
+                                                  double *target);
+
+/**
+ * Sets the volume that volume control aims at for a skeleton: a muscle that flexes. The surface moves by at most a
+ * tenth of the skeleton's thickness in a step, and by at most half of it inwards and all of it outwards in all.
+ *
+ * - world: not NULL.
+ * - skeleton: the skeleton.
+ * - target: the volume, in m^3, > 0 and at most 1e30.
+ *
+ * Errors: INVALID_HANDLE, OUT_OF_RANGE, UNSUPPORTED (a plane; the volume_gain of its body is 0).
+ * Threads: changes the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_skeleton_set_target_volume(isocoat_world *world,
+                                                  isocoat_skeleton skeleton,
+                                                  double target);
+
+/**
+ * How far volume control has moved a skeleton's surface outwards: its thickness and radius are larger by so much than
+ * its descriptor says. 0 without volume control.
+ *
+ * - world: not NULL.
+ * - skeleton: the skeleton.
+ * - offset: receives the distance, in m; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_skeleton_get_offset(const isocoat_world *world,
+                                           isocoat_skeleton skeleton,
+                                           double *offset);
 
 /* ---- Debug drawing ----------------------------------------------------------------------------------------------- */
 

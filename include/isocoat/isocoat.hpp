@@ -191,6 +191,11 @@ public:
     {
         check(isocoat_skeleton_set_pair_contact(world_, raw_, other.raw_, enabled));
     }
+    /* Volume of its territory, what volume control aims at, and how far it has moved the surface outwards. */
+    double volume() const { return detail::read(0.0, isocoat_skeleton_get_volume, world_, raw_); }
+    double target_volume() const { return detail::read(0.0, isocoat_skeleton_get_target_volume, world_, raw_); }
+    void set_target_volume(double target) { check(isocoat_skeleton_set_target_volume(world_, raw_, target)); }
+    double offset() const { return detail::read(0.0, isocoat_skeleton_get_offset, world_, raw_); }
     seed_list seeds() const
     {
         std::size_t count = 0;
@@ -287,6 +292,8 @@ public:
     bool is_awake() const { return detail::read(false, isocoat_body_is_awake, world_, raw_); }
     void wake() { check(isocoat_body_wake(world_, raw_)); }
     void *user_data() const { return detail::read<void *>(nullptr, isocoat_body_get_user_data, world_, raw_); }
+    /* Volume of its solid, also without volume control. */
+    double volume() const { return detail::read(0.0, isocoat_body_get_volume, world_, raw_); }
     link create_link(const isocoat_link_desc &desc)
     {
         return {world_, detail::read(isocoat_link{}, isocoat_link_create, world_, raw_, &desc)};

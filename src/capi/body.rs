@@ -82,6 +82,9 @@ pub struct isocoat_body_desc {
     pub self_contact: u32,
     /// 0.
     pub reserved_2: u32,
+    /// Volume control: share of each skeleton's error in volume that a step takes back, from 0 (off) to 0.5, which is
+    /// the best for most. See isocoat_skeleton_set_target_volume(). Default 0.
+    pub volume_gain: f64,
 }
 
 // SAFETY: `repr(C)`, the size first, numbers and a pointer that is never followed.
@@ -130,6 +133,7 @@ impl From<&BodyDesc> for isocoat_body_desc {
             blend_band: desc.blend_band,
             self_contact: desc.self_contact.into(),
             reserved_2: 0,
+            volume_gain: desc.volume_gain,
         }
     }
 }
@@ -165,6 +169,7 @@ impl isocoat_body_desc {
             blend_band: self.blend_band,
             self_contact: flag("self_contact", self.self_contact)?,
             may_sleep: flag("may_sleep", self.may_sleep)?,
+            volume_gain: self.volume_gain,
         })
     }
 }

@@ -2,12 +2,13 @@
 //!
 //! [`cliques`] turns who blends with whom into groups of skeletons that add up, and pairs of groups that collide.
 //! [`seeds`] sends fixed rays from each skeleton; [`territory`] follows them to the coat's surface or to the border of
-//! another skeleton's territory.
+//! another skeleton's territory; [`volume`] measures what they enclose, and keeps it.
 
 pub mod cliques;
 pub mod root;
 pub mod seeds;
 pub mod territory;
+pub mod volume;
 
 use crate::field::{Graph, Placed, Profile, Shape, blend};
 use crate::math::{Pose, Vec3};

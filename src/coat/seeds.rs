@@ -99,6 +99,16 @@ pub fn plane_rays(point: &Vec3, normal: &Vec3, spacing: f64, low: &Vec3, high: &
     }
 }
 
+/// Volume of a shape that is solid \[m³\]: what lies within it, and no ray counts. Zero for thin shapes, infinite for
+/// planes.
+pub fn core_volume(shape: &Shape) -> f64 {
+    match shape {
+        Shape::Box { half, .. } => 8.0 * half.x * half.y * half.z,
+        Shape::Plane { .. } => f64::INFINITY,
+        Shape::Point(_) | Shape::Segment(..) | Shape::Triangle(..) => 0.0,
+    }
+}
+
 /// One piece of a shape's normal bundle.
 enum Part {
     /// Directions from one foot: `z` along `axis` from `low` to 1, azimuth from `e1` towards `e2` by `angle`.

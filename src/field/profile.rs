@@ -73,6 +73,14 @@ impl Profile {
         Ok(Self { isovalue, thickness, stiffness, stiffening, radius, cap })
     }
 
+    /// The profile with its surface moved outwards by `offset`, more than `-t` \[m\]: `F(d - offset)` \[97, eq. (23)\]
+    /// from the surface outwards. Inside, it keeps its slopes at the surface and at the skeleton.
+    pub fn inflated(&self, offset: f64) -> Self {
+        let thickness = self.thickness + offset;
+        let cap = if self.cap > 0.0 { CAP * thickness } else { 0.0 };
+        Self { thickness, radius: self.radius + offset, cap, ..*self }
+    }
+
     /// `F`, `F'` at distance `d` (negative inside a solid skeleton).
     #[inline]
     pub fn value_slope(&self, d: f64) -> (f64, f64) {

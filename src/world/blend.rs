@@ -3,7 +3,7 @@
 use super::{Body, BodyId, LinkId, LogLevel, SkeletonId, World};
 use crate::coat::cliques::{self, Block, Weights};
 use crate::error::{Error, Result, require};
-use crate::field::{Graph, blend};
+use crate::field::Graph;
 
 /// Most skeletons of a body with a blend graph.
 const MOST_SKELETONS: usize = 1024;
@@ -19,6 +19,8 @@ pub(crate) struct Blending {
     pub pairs: Vec<Pairing>,
     /// What this comes to for the enabled skeletons, by their positions among these.
     pub graph: Graph,
+    /// How many skeletons are in the largest clique of each; empty when all blend.
+    pub together: Vec<usize>,
     /// The slots of the enabled skeletons.
     pub order: Vec<u32>,
     pub blocks: Vec<Block>,
@@ -186,25 +188,20 @@ impl World {
             let apart = || blending.find(slots).is_ok_and(|at| blending.pairs[at].apart);
             collide && links[0] != links[1] && !apart()
         });
+        blending.together = graph.largest_cliques();
         (blending.graph, blending.blocks) = (graph, blocks);
         blending.order = skeletons.iter().map(|(_, slot)| *slot).collect();
         Ok(())
     }
 
-    /// Brings a body's graph up to date after a change of its parts, and how far its surface may be from them.
-    pub(super) fn measure_blending(&mut self, slot: usize) {
+    /// Brings a body's graph up to date after a change of its parts.
+    pub(super) fn compile_blending(&mut self, slot: usize) {
         let Some(mut blending) = self.bodies[slot].blending.take() else { return };
         if let Err(error) = self.compile(slot, &mut blending) {
-            (blending.graph, blending.order, blending.blocks) = Default::default();
+            (blending.graph, blending.together, blending.order, blending.blocks) = Default::default();
             if let Some(log) = self.log.get_mut() {
                 let id = self.bodies.id_of(slot);
                 log(LogLevel::Warning, &format!("body {id:?}: all its skeletons blend until it is changed: {error}"));
-            }
-        }
-        if !blending.graph.is_complete() {
-            for (skeleton, count) in blending.order.iter().zip(blending.graph.largest_cliques()) {
-                let skeleton = &mut self.skeletons[*skeleton as usize];
-                skeleton.reach = blend::reach(&skeleton.profile, count, blending.graph.rise());
             }
         }
         self.bodies[slot].blending = Some(blending);
@@ -227,6 +224,7 @@ impl World {
                 }
             }
             self.rouse(slot as u32);
+            self.unsettle(slot);
             self.measure(slot);
         }
     }

@@ -140,6 +140,9 @@ pub struct BodyDesc {
     pub self_contact: bool,
     /// It may fall asleep, where [`WorldDesc::sleep_time`] lets bodies sleep.
     pub may_sleep: bool,
+    /// Volume control: share of each skeleton's error in volume that a step takes back, from 0 (off) to 0.5, which is
+    /// the best for most. See [`World::set_skeleton_target_volume`](super::World::set_skeleton_target_volume).
+    pub volume_gain: f64,
     /// The host's own value.
     pub user_data: usize,
 }
@@ -161,6 +164,7 @@ impl Default for BodyDesc {
             blend_band: 0.05,
             self_contact: true,
             may_sleep: true,
+            volume_gain: 0.0,
             user_data: 0,
         }
     }
@@ -185,6 +189,7 @@ impl BodyDesc {
         not_negative("viscous_friction", self.viscous_friction)?;
         require("blend_band", self.blend_band, "from 0 to 0.5", |x| (0.0..=0.5).contains(&x))?;
         not_negative("dissipation", self.dissipation)?;
+        require("volume_gain", self.volume_gain, "from 0 (off) to 0.5", |x| (0.0..=0.5).contains(&x))?;
         require("static_friction", self.static_friction, "0 (off), or at least friction", |x| {
             x == 0.0 || x >= self.friction.max(0.0) && x > 0.0
         })

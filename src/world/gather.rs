@@ -191,13 +191,13 @@ impl Side {
 
 impl Skeleton {
     /// The skeleton's rays in its link's frame, made at the first use. None for a plane: its lattice depends on what
-    /// lies on it.
+    /// lies on it. They are those of the coat without an offset, so that they stay the same while it swells.
     pub(super) fn rays(&self, default_count: u32) -> std::sync::Arc<[crate::coat::seeds::Ray]> {
         let count = if self.desc.seed_count == 0 { default_count } else { self.desc.seed_count };
         let make = || {
             let mut rays = Vec::new();
             if !matches!(self.desc.shape, Shape::Plane { .. }) {
-                crate::coat::seeds::rays(&self.desc.shape, self.profile.thickness, count as usize, &mut rays);
+                crate::coat::seeds::rays(&self.desc.shape, self.desc.thickness, count as usize, &mut rays);
             }
             (count, rays.into())
         };

@@ -15,6 +15,7 @@ mod sleep;
 mod snapshot;
 mod step;
 mod units;
+mod volume;
 
 use crate::handle::{Arena, Noun, WorldTag};
 pub use desc::{
@@ -46,6 +47,8 @@ pub struct Body {
     /// Who blends with whom, unless all do.
     blending: Option<Box<blend::Blending>>,
     sleep: sleep::Sleep,
+    /// Only with volume control.
+    volume: Option<Box<volume::Control>>,
 }
 
 /// A link as the world keeps it.
@@ -73,6 +76,10 @@ pub struct Skeleton {
     pub(crate) profile: Profile,
     pub(crate) link: u32,
     pub(crate) enabled: bool,
+    /// How far volume control has moved its surface outwards \[m\]; `profile` has it in it.
+    pub(crate) offset: f64,
+    /// The volume that volume control aims at \[m³\]; none before its first look.
+    pub(crate) target: Option<f64>,
     /// How far from it the body's surface may lie.
     pub(crate) reach: f64,
     /// Its rays, and the count they were made for; made at the first use.
@@ -123,6 +130,8 @@ pub struct World {
     log: Alone<Option<Log>>,
     pair_filter: Alone<Option<PairFilter>>,
     tasks: Alone<Option<Box<dyn Tasks>>>,
+    /// A body has volume control, or has had it: without any, steps need not look.
+    controls_volumes: bool,
     stepping: step::Stepping,
 }
 
@@ -143,6 +152,7 @@ impl World {
             log: Alone::default(),
             pair_filter: Alone::default(),
             tasks: Alone::default(),
+            controls_volumes: false,
             stepping: step::Stepping::default(),
         })
     }
@@ -155,12 +165,13 @@ impl World {
     /// Changes the settings, from the next step on.
     pub fn set_desc(&mut self, desc: WorldDesc) -> Result<()> {
         desc.validate()?;
-        let gravity_changes = desc.gravity != self.desc.gravity;
+        // What is worked out about bodies depends on these two.
+        let changes = desc.gravity != self.desc.gravity || desc.seed_count != self.desc.seed_count;
         if desc != self.desc {
             self.rouse_all();
         }
         self.desc = desc;
-        if gravity_changes {
+        if changes {
             for index in 0..self.bodies.capacity() {
                 if self.bodies.is_live(index) {
                     self.refresh(index);
@@ -196,6 +207,7 @@ impl World {
     pub fn create_body(&mut self, desc: BodyDesc) -> Result<BodyId> {
         desc.validate()?;
         let (stiffness_scale, dissipation) = (desc.stiffness_scale, desc.dissipation);
+        self.controls_volumes |= desc.volume_gain > 0.0;
         self.bodies.insert(Body {
             desc,
             links: Vec::new(),
@@ -206,6 +218,7 @@ impl World {
             units: units::Said::default(),
             blending: None,
             sleep: sleep::Sleep::default(),
+            volume: None,
         })
     }
 
@@ -242,12 +255,17 @@ impl World {
             }
             for skeleton in skeletons().copied().collect::<Vec<_>>() {
                 let skeleton = &mut self.skeletons[skeleton as usize];
-                skeleton.profile = skeleton.desc.profile(desc.isovalue)?;
+                skeleton.profile = skeleton.desc.profile(desc.isovalue)?.inflated(skeleton.offset);
                 skeleton.rays = Default::default();
             }
         }
+        self.controls_volumes |= desc.volume_gain > 0.0;
         let body = self.bodies.get_mut(id)?;
+        let switched = (desc.volume_gain > 0.0) != (body.desc.volume_gain > 0.0);
         body.desc = desc;
+        if switched {
+            self.reset_volumes(id.index());
+        }
         self.refresh(id.index());
         Ok(())
     }
@@ -368,22 +386,37 @@ impl World {
     /// Brings what is derived from a body's parts up to date after a change of any of them.
     fn refresh(&mut self, slot: usize) {
         self.rouse(slot as u32);
+        self.unsettle(slot);
         self.bodies[slot].units = units::Said::default();
         self.measure(slot);
     }
 
     /// Works out what follows from the descriptors of a body and its parts.
     fn measure(&mut self, slot: usize) {
-        let body = &self.bodies[slot];
-        let skeletons: Vec<u32> = self.skeletons_of(body).map(|(_, index, _)| index).collect();
-        for index in &skeletons {
-            let skeleton = &mut self.skeletons[*index as usize];
-            skeleton.reach = crate::field::blend::reach(&skeleton.profile, skeletons.len(), 0.0);
-        }
-        let derived = units::derive(self, body);
+        self.compile_blending(slot);
+        self.measure_reach(slot);
+        let derived = units::derive(self, &self.bodies[slot]);
         let body = &mut self.bodies[slot];
         (body.stiffness_scale, body.dissipation) = derived;
-        self.measure_blending(slot);
+    }
+
+    /// How far the surface of a body may lie from its skeletons.
+    fn measure_reach(&mut self, slot: usize) {
+        let body = &self.bodies[slot];
+        let count = self.skeletons_of(body).count();
+        let blending = body.blending.as_ref().filter(|blending| !blending.graph.is_complete());
+        let rise = blending.map_or(0.0, |blending| blending.graph.rise());
+        let mut position = 0;
+        for link in body.links.iter().map(|link| &self.links[*link as usize]).filter(|link| link.enabled) {
+            for index in &link.skeletons {
+                let skeleton = &mut self.skeletons[*index as usize];
+                if skeleton.enabled {
+                    let together = blending.map_or(count, |blending| blending.together[position]);
+                    skeleton.reach = crate::field::blend::reach(&skeleton.profile, together, rise);
+                    position += 1;
+                }
+            }
+        }
     }
 
     /// Creates a skeleton of a link. A plane needs a link of kind fixed.
@@ -394,6 +427,8 @@ impl World {
             profile,
             link: link.raw.index,
             enabled: true,
+            offset: 0.0,
+            target: None,
             reach: profile.thickness,
             rays: Default::default(),
         })?;
@@ -429,7 +464,8 @@ impl World {
         Ok(&self.skeletons.get(id)?.desc)
     }
 
-    /// The field profile of a skeleton, with the stiffness and radius that stand for zeros in its descriptor.
+    /// The field profile of a skeleton, with the stiffness and radius that stand for zeros in its descriptor, as volume
+    /// control has moved it.
     pub fn skeleton_profile(&self, id: SkeletonId) -> Result<&Profile> {
         Ok(&self.skeletons.get(id)?.profile)
     }
@@ -439,7 +475,11 @@ impl World {
         let link = self.links.id_of(self.skeletons.get(id)?.link as usize);
         let profile = self.check_skeleton(link, &desc)?;
         let skeleton = self.skeletons.get_mut(id)?;
-        (skeleton.desc, skeleton.profile, skeleton.rays) = (desc, profile, Default::default());
+        if desc != (SkeletonDesc { user_data: desc.user_data, ..skeleton.desc.clone() }) {
+            (skeleton.offset, skeleton.target) = (0.0, None);
+        }
+        skeleton.profile = profile.inflated(skeleton.offset);
+        (skeleton.desc, skeleton.rays) = (desc, Default::default());
         let body = self.links.get(link)?.body as usize;
         self.refresh(body);
         Ok(())

@@ -1,10 +1,10 @@
 //! Questions between steps: fields, rays, overlaps, closest points, seeds.
 
-use super::{BodyId, LinkId, SkeletonId, World};
+use super::{Body, BodyId, LinkId, SkeletonId, World};
 use crate::coat::{Coat, seeds, territory};
 use crate::error::{Error, Result, out_of_range, require, require_finite};
 use crate::field::lanes;
-use crate::math::Vec3;
+use crate::math::{Pose, Vec3};
 use crate::surface::{SurfaceHit, closest, ray};
 
 /// Where a ray meets a coat.
@@ -50,10 +50,12 @@ pub struct Seed {
     pub valid: bool,
 }
 
-/// A body's coat as it is now, and the arena indices of the skeletons in it.
+/// A body's coat as it is now; the arena indices of the skeletons in it, and their links' poses in its frame.
+#[derive(Default)]
 pub(super) struct PosedCoat {
     pub(super) coat: Coat,
     pub(super) skeletons: Vec<usize>,
+    pub(super) poses: Vec<Pose>,
 }
 
 impl PosedCoat {
@@ -70,23 +72,34 @@ impl World {
     /// The enabled skeletons of a body at the present poses, in a frame at its first link.
     pub(super) fn posed_coat(&self, body: usize) -> PosedCoat {
         let body = &self.bodies[body];
-        let links = || body.links.iter().map(|index| &self.links[*index as usize]);
-        let origin = links().next().map_or(Vec3::zeros(), |link| link.desc.pose.position);
-        let mut coat = Coat::new(origin, body.desc.isovalue);
-        let mut skeletons = Vec::new();
-        for link in links().filter(|link| link.enabled) {
-            for &index in &link.skeletons {
+        let poses = || body.links.iter().map(|index| self.links[*index as usize].desc.pose);
+        let mut posed = PosedCoat::default();
+        posed.coat.origin = poses().next().map_or(Vec3::zeros(), |pose| pose.position);
+        self.fill_coat(body, poses(), &mut posed);
+        posed
+    }
+
+    /// Fills a coat, whose origin stays, with the enabled skeletons of a body, its links at these poses.
+    pub(super) fn fill_coat(&self, body: &Body, poses: impl Iterator<Item = Pose>, posed: &mut PosedCoat) {
+        let PosedCoat { coat, skeletons, poses: places } = posed;
+        coat.isovalue = body.desc.isovalue;
+        coat.skeletons.clear();
+        skeletons.clear();
+        places.clear();
+        for (link, pose) in body.links.iter().map(|index| &self.links[*index as usize]).zip(poses) {
+            for &index in link.skeletons.iter().filter(|_| link.enabled) {
                 let skeleton = &self.skeletons[index as usize];
                 if skeleton.enabled {
-                    coat.add(&skeleton.desc.shape, skeleton.profile, &link.desc.pose);
+                    coat.add(&skeleton.desc.shape, skeleton.profile, &pose);
                     skeletons.push(index as usize);
+                    places.push(coat.localise(&pose));
                 }
             }
         }
-        if let Some(blending) = &body.blending {
-            coat.graph.clone_from(&blending.graph);
+        match &body.blending {
+            Some(blending) => coat.graph.clone_from(&blending.graph),
+            None => coat.graph.clear(),
         }
-        PosedCoat { coat, skeletons }
     }
 
     /// Bodies that take part and have a bit of the mask in their category, in the order of their ids.
@@ -220,7 +233,7 @@ impl World {
         let count = if desc.seed_count == 0 { self.desc.seed_count } else { desc.seed_count };
         let mut rays = Vec::new();
         seeds::rays(&desc.shape, desc.thickness, count as usize, &mut rays);
-        let pose = posed.coat.localise(&self.links[link].desc.pose);
+        let pose = posed.poses[index];
         for ray in &mut rays {
             *ray = ray.transformed(&pose);
         }

@@ -6,6 +6,7 @@
 //! when the host changes one of them or what they lean on.
 
 use super::step::Stepping;
+use super::volume::Control;
 use super::{Body, BodyId, Contact, Link, World};
 use crate::base::Kind;
 use crate::contact::candidate::{Candidate, Memory};
@@ -45,17 +46,7 @@ impl World {
 
     /// Wakes a body with its group, or, if it is not asleep, those that lean on it.
     pub(super) fn rouse(&mut self, slot: u32) {
-        if wake(&mut self.bodies, slot) {
-            return;
-        }
-        self.bodies[slot as usize].sleep.quiet = 0.0;
-        for Memory { ids, .. } in &self.stepping.resting {
-            if ids.iter().any(|id| id.index == slot) {
-                for id in ids {
-                    wake(&mut self.bodies, id.index);
-                }
-            }
-        }
+        rouse(&mut self.bodies, &self.stepping.resting, slot);
     }
 
     /// Wakes all.
@@ -212,6 +203,7 @@ impl World {
         let size = bounds.map_or(0.0, |bounds| 0.5 * (bounds.high - bounds.low).norm());
         let most = if thickness.is_finite() { self.desc.sleep_speed * thickness } else { 0.0 };
         body.desc.may_sleep
+            && Control::is_settled(body)
             && body.links.iter().all(|link| {
                 let (kind, twist) = (self.links[*link as usize].desc.kind, state.motions[*link as usize].twist);
                 let moving = state.motions[*link as usize].is_movable();
@@ -223,6 +215,21 @@ impl World {
 
 fn is_asleep(bodies: &Arena<Body>, slot: u32) -> bool {
     bodies.is_live(slot as usize) && bodies[slot as usize].is_asleep()
+}
+
+/// [`World::rouse`], with the pairs that are asleep.
+pub(super) fn rouse(bodies: &mut Arena<Body>, resting: &[Memory], slot: u32) {
+    if wake(bodies, slot) {
+        return;
+    }
+    bodies[slot as usize].sleep.quiet = 0.0;
+    for Memory { ids, .. } in resting {
+        if ids.iter().any(|id| id.index == slot) {
+            for id in ids {
+                wake(bodies, id.index);
+            }
+        }
+    }
 }
 
 /// Wakes a body that is asleep, with its group. False when it is not.

@@ -23,6 +23,7 @@ use super::{
     desc, step, units::Said,
 };
 use crate::base::Kind;
+use crate::coat::volume::OFFSETS;
 use crate::contact::Scheme;
 use crate::contact::candidate::Memory;
 use crate::contact::friction::Bristle;
@@ -62,7 +63,7 @@ structs! {
     }
     BodyDesc {
         rigid, response, isovalue, stiffness_scale, stiffness, friction, static_friction, viscous_friction, dissipation,
-        category, mask, blend_band, self_contact, may_sleep, user_data,
+        category, mask, blend_band, self_contact, may_sleep, volume_gain, user_data,
     }
     LinkDesc {
         kind, pose, twist, mass, local_center, inertia, gravity_scale, external_acceleration,
@@ -71,14 +72,17 @@ structs! {
     }
     SkeletonDesc { shape, thickness, stiffness, stiffening, radius, seed_count, user_data }
     // What the descriptor comes to follows from the parts.
-    Body { desc, links, enabled, stacked, units, blending, sleep; stiffness_scale: 0.0, dissipation: 0.0 }
-    Blending { by_links, joints, pairs; graph: Graph::default(), order: Vec::new(), blocks: Vec::new() }
+    Body { desc, links, enabled, stacked, units, blending, sleep; stiffness_scale: 0.0, dissipation: 0.0, volume: None }
+    Blending {
+        by_links, joints, pairs;
+        graph: Graph::default(), together: Vec::new(), order: Vec::new(), blocks: Vec::new()
+    }
     Pairing { skeletons, weight, target, rate, apart }
     Link {
         desc, body, skeletons, enabled, applied_force, applied_impulse, contact_impulse, host_impulse, last_dt, mirror,
     }
     // The profile and the reach follow from the descriptors; the rays are made at their first use.
-    Skeleton { desc, link, enabled; profile: NO_PROFILE, reach: 0.0, rays: Default::default() }
+    Skeleton { desc, link, enabled, offset, target; profile: NO_PROFILE, reach: 0.0, rays: Default::default() }
     Said { sink, travel }
     Sleep { quiet, group }
     Mirror {
@@ -269,8 +273,19 @@ impl World {
     }
 
     fn write(&self, out: &mut impl Sink) {
-        let Self { desc, origin, own_tag: _, bodies, links, skeletons, log: _, pair_filter: _, tasks: _, stepping } =
-            self;
+        let Self {
+            desc,
+            origin,
+            own_tag: _,
+            bodies,
+            links,
+            skeletons,
+            log: _,
+            pair_filter: _,
+            tasks: _,
+            controls_volumes: _,
+            stepping,
+        } = self;
         origin.write(out);
         desc.write(out);
         write_arena(bodies, out);
@@ -308,6 +323,7 @@ impl World {
             log: Alone::default(),
             pair_filter: Alone::default(),
             tasks: Alone::default(),
+            controls_volumes: false,
             stepping: step::Stepping::default(),
         };
         let mut memories: Vec<Memory> = from.read("pairs of bodies")?;
@@ -346,8 +362,21 @@ impl World {
             skeletons.iter_mut().for_each(|id| id.raw.world = tag);
         }
         fresh.take_rays_of(self);
-        let World { desc, origin, own_tag: _, bodies, links, skeletons, log: _, pair_filter: _, tasks: _, stepping: _ } =
-            fresh;
+        fresh.controls_volumes = fresh.bodies.indices().any(|body| fresh.bodies[body].desc.volume_gain > 0.0);
+        let World {
+            desc,
+            origin,
+            own_tag: _,
+            bodies,
+            links,
+            skeletons,
+            log: _,
+            pair_filter: _,
+            tasks: _,
+            controls_volumes,
+            stepping: _,
+        } = fresh;
+        self.controls_volumes = controls_volumes;
         (self.desc, self.origin) = (desc, origin);
         (self.bodies, self.links, self.skeletons) = (bodies, links, skeletons);
         self.stepping.restart(memories, resting, contacts);
@@ -374,6 +403,11 @@ impl World {
         }
         for index in self.links.indices() {
             check_link(&self.links[index]).map_err(|error| refused(format_args!("link {index}"), error))?;
+        }
+        for index in self.skeletons.indices() {
+            let skeleton = &self.skeletons[index];
+            let controlled = self.bodies[self.links[skeleton.link as usize].body as usize].desc.volume_gain > 0.0;
+            check_skeleton(skeleton, controlled).map_err(|error| refused(format_args!("skeleton {index}"), error))?;
         }
         Ok(())
     }
@@ -417,7 +451,8 @@ impl World {
                 check_plane(&skeleton.desc, link.desc.kind)?;
                 Ok(profile)
             });
-            skeleton.profile = profile.map_err(|error| refused(format_args!("skeleton {index}"), error))?;
+            let profile = profile.map_err(|error| refused(format_args!("skeleton {index}"), error))?;
+            skeleton.profile = profile.inflated(skeleton.offset);
             skeleton.reach = skeleton.profile.thickness;
         }
         for body in 0..self.bodies.capacity() {
@@ -601,6 +636,18 @@ fn check_link(link: &Link) -> Result<()> {
     }
     require("commanded change of velocity", *commanded, "finite and at least 0", |x| x >= 0.0)?;
     desc::validate_pose(&Pose { position: *expected_center, rotation: *expected_rotation })
+}
+
+/// Only volume control has offsets and targets.
+fn check_skeleton(skeleton: &Skeleton, controlled: bool) -> Result<()> {
+    let Skeleton { desc, link: _, enabled: _, offset, target, profile: _, reach: _, rays: _ } = skeleton;
+    let (low, high) = OFFSETS;
+    require("offset", *offset, "from -0.5 to 1 thickness, and 0 without volume control", |x| {
+        x == 0.0 || controlled && (low * desc.thickness..=high * desc.thickness).contains(&x)
+    })?;
+    target.map_or(Ok(()), |target| {
+        require("target volume", target, "at least 0, and none without volume control", |x| controlled && x >= 0.0)
+    })
 }
 
 /// Equal in every bit: zeros of different signs are not the same.

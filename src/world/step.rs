@@ -4,6 +4,7 @@ use std::sync::Mutex;
 
 use super::events::{Contact, Counters, Event, EventKind, LogLevel, Times};
 use super::respond::{Worker, unlocked};
+use super::volume::Control;
 use super::{BodyId, Link, World, units};
 use crate::base::{Kind, Motion};
 use crate::clock::Clock;
@@ -49,6 +50,8 @@ pub(crate) struct Stepping {
     /// The motions of links asleep are in place.
     settled: bool,
     pub(super) probe: Candidate,
+    /// Bodies whose volumes this step controls.
+    pub(super) controlled: Vec<(usize, Box<Control>)>,
     pub(super) islands: Vec<Group>,
     pub(super) island_count: usize,
     roots: Vec<u32>,
@@ -143,6 +146,7 @@ impl Stepping {
             met: _,
             previous: _,
             spare: _,
+            controlled: _,
             islands: _,
             island_count: _,
             roots: _,
@@ -204,6 +208,7 @@ impl World {
         let timed = self.desc.timed;
         let (mut whole, mut clock, mut times) = (Clock::start(timed), Clock::start(timed), Times::default());
         self.ramp_blends(dt);
+        self.control_volumes(state, team);
         self.begin(state, dt);
         clock.lap(&mut times.begin);
         self.find_candidates(state, dt, team);

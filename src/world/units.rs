@@ -36,7 +36,7 @@ pub(super) fn check(world: &World, index: usize, motions: &[Motion], dt: f64, sa
     if !said.sink {
         said.sink = true;
         let weight: f64 = movable().map(|motion| motion.acceleration.norm() / motion.inverse_mass()).sum();
-        let load = |skeleton: &super::Skeleton| body.stiffness_scale * carried(skeleton, SINK);
+        let load = |skeleton: &Skeleton| body.stiffness_scale * carried(skeleton, skeleton.profile.thickness, SINK);
         let most: f64 = skeletons().map(load).sum();
         if !body.desc.rigid && weight > most {
             say(&format!(
@@ -62,7 +62,8 @@ pub(super) fn check(world: &World, index: usize, motions: &[Motion], dt: f64, sa
 }
 
 /// Stiffness scale \[Pa\] and dissipation \[s/m\] of a body by what its descriptor says, for rest on a hard floor on all
-/// its skeletons, under gravity; or the standard gravity where a world has none.
+/// its skeletons, under gravity; or the standard gravity where a world has none. Flesh does not change its stiffness
+/// with its volume: it is that of the coat without offsets.
 pub(super) fn derive(world: &World, body: &Body) -> (f64, f64) {
     let desc = &body.desc;
     let given = (desc.stiffness_scale, desc.dissipation);
@@ -71,7 +72,8 @@ pub(super) fn derive(world: &World, body: &Body) -> (f64, f64) {
         0.0 => STANDARD_GRAVITY,
         gravity => gravity,
     };
-    let carried_at = |sink: f64| world.skeletons_of(body).map(|(_, _, skeleton)| carried(skeleton, sink)).sum::<f64>();
+    let skeletons = || world.skeletons_of(body).map(|(_, _, skeleton)| skeleton);
+    let carried_at = |sink: f64| skeletons().map(|k| carried(k, k.desc.thickness, sink)).sum::<f64>();
     let scale_at = |sink: f64| mass * gravity / carried_at(sink);
     let usable = |scale: f64| scale.is_finite() && scale > 0.0;
     match desc.stiffness {
@@ -82,7 +84,7 @@ pub(super) fn derive(world: &World, body: &Body) -> (f64, f64) {
         },
         StiffnessRule::Frequency { hertz, damping_ratio } => {
             let rate = 2.0 * PI * hertz;
-            let thickness = world.skeletons_of(body).map(|(_, _, skeleton)| skeleton.profile.thickness);
+            let thickness = skeletons().map(|skeleton| skeleton.desc.thickness);
             let thickness = thickness.fold(f64::INFINITY, f64::min);
             // w² = (dF/ds) g / F at the sink of rest, which falls as the sink grows.
             let rate2_at = |sink: f64| {
@@ -111,10 +113,10 @@ fn mass_of(link: &LinkDesc) -> f64 {
     if link.kind == Kind::Fixed { 0.0 } else { link.mass }
 }
 
-/// Force that a skeleton's coat carries on a hard floor at a sink of this fraction of its thickness, over the stiffness
-/// scale \[m²\].
-fn carried(skeleton: &Skeleton, fraction: f64) -> f64 {
-    let (t, slope) = (skeleton.profile.thickness, skeleton.profile.stiffness);
+/// Force that a skeleton's coat of thickness `t` carries on a hard floor at a sink of this fraction of it, over the
+/// stiffness scale \[m²\].
+fn carried(skeleton: &Skeleton, t: f64, fraction: f64) -> f64 {
+    let slope = skeleton.profile.stiffness;
     let sink = fraction * t;
     // Corners, edges and faces on the floor: ∫ of the pressure under a ball, a cylinder (chord law) and a plane.
     let corner = PI * slope * sink * sink * (t - 2.0 * sink / 3.0);

@@ -282,6 +282,15 @@ static void queries()
     const isocoat::seed_list seeds = bodies[0].links()[0].skeletons()[0].seeds();
     CHECK(seeds.positions.size() >= 64 && seeds.normals.size() == seeds.positions.size() && seeds.valid[0] == 1);
 
+    const isocoat::skeleton point = bodies[0].links()[0].skeletons()[0];
+    CHECK(point.volume() == bodies[0].volume() && point.volume() > 0.0 && point.offset() == 0.0);
+    try {
+        isocoat::skeleton(point).set_target_volume(point.target_volume());
+        CHECK(false);
+    } catch (const isocoat::error &error) {
+        CHECK(error.status() == ISOCOAT_ERROR_UNSUPPORTED);
+    }
+
     int drawn = 0;
     world.debug_draw(
         ISOCOAT_DRAW_SKELETONS | ISOCOAT_DRAW_BOUNDS, [&](const double *, const double *, std::uint32_t) { ++drawn; },

@@ -195,3 +195,33 @@ impl Oracle {
         force
     }
 }
+
+/// Volume of the territory of each of some bounded skeletons (shape, thickness, radius) that blend, by counting the
+/// cells of a lattice with `n` along the longest side.
+pub fn territories(skeletons: &[(Shape, f64, f64)], n: usize) -> Vec<f64> {
+    let bounds = skeletons.iter().map(|(shape, _, radius)| shape.bounds(*radius));
+    let (low, high) = bounds.reduce(|(l, h), (low, high)| (l.inf(&low), h.sup(&high))).unwrap();
+    let cell = (high - low).max() / n as f64;
+    let counts = ((high - low) / cell).map(|x| x.ceil() as usize);
+    let mut volumes = vec![0.0; skeletons.len()];
+    for index in 0..counts.product() {
+        let place = Vec3::new(
+            (index % counts.x) as f64,
+            (index / counts.x % counts.y) as f64,
+            (index / (counts.x * counts.y)) as f64,
+        );
+        let p = low + (place + Vec3::repeat(0.5)) * cell;
+        let (mut sum, mut best) = (0.0, (0, f64::NEG_INFINITY));
+        for (index, (shape, thickness, radius)) in skeletons.iter().enumerate() {
+            let value = profile(distance(shape, p), *thickness, *radius);
+            sum += value;
+            if value > best.1 {
+                best = (index, value);
+            }
+        }
+        if sum >= 1.0 {
+            volumes[best.0] += cell.powi(3);
+        }
+    }
+    volumes
+}
