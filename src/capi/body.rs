@@ -75,6 +75,12 @@ pub struct isocoat_body_desc {
     pub may_sleep: u32,
     /// 0.
     pub reserved: u32,
+    /// How far round its contacts its coat bulges, from 0 (not at all) to 1, over the isovalue: until the field of what
+    /// it touches has fallen by so much. Seen by queries with ISOCOAT_DEFORMATION_BULGES; forces know no bulges.
+    /// Default 0.
+    pub bulge_width: f64,
+    /// Height of those bulges over the most that the contact compresses the coat, from 0 to 1e6. Default 1.
+    pub bulge_height: f64,
 }
 
 // SAFETY: `repr(C)`, the size first, numbers and a pointer that is never followed.
@@ -120,6 +126,8 @@ impl From<&BodyDesc> for isocoat_body_desc {
             damping_ratio,
             may_sleep: desc.may_sleep.into(),
             reserved: 0,
+            bulge_width: desc.bulge_width,
+            bulge_height: desc.bulge_height,
         }
     }
 }
@@ -152,6 +160,8 @@ impl isocoat_body_desc {
             user_data: self.user_data as usize,
             response: response_from_c(self.response)?,
             may_sleep: flag("may_sleep", self.may_sleep)?,
+            bulge_width: self.bulge_width,
+            bulge_height: self.bulge_height,
         })
     }
 }

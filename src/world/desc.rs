@@ -135,6 +135,11 @@ pub struct BodyDesc {
     pub mask: u64,
     /// It may fall asleep, where [`WorldDesc::sleep_time`] lets bodies sleep.
     pub may_sleep: bool,
+    /// How far round its contacts its coat bulges, from 0 (not at all) to 1, over the isovalue: until the obstacle's
+    /// field has fallen by so much. For queries with [`Deformation::Bulges`](super::Deformation); forces know no bulges.
+    pub bulge_width: f64,
+    /// Height of those bulges over the most that the contact compresses the coat, at least 0.
+    pub bulge_height: f64,
     /// The host's own value.
     pub user_data: usize,
 }
@@ -154,6 +159,8 @@ impl Default for BodyDesc {
             category: 1,
             mask: u64::MAX,
             may_sleep: true,
+            bulge_width: 0.0,
+            bulge_height: 1.0,
             user_data: 0,
         }
     }
@@ -177,6 +184,8 @@ impl BodyDesc {
         not_negative("friction", self.friction)?;
         not_negative("viscous_friction", self.viscous_friction)?;
         not_negative("dissipation", self.dissipation)?;
+        require("bulge_width", self.bulge_width, "from 0 to 1", |x| (0.0..=1.0).contains(&x))?;
+        require("bulge_height", self.bulge_height, "from 0 to 1e6", |x| (0.0..=1e6).contains(&x))?;
         require("static_friction", self.static_friction, "0 (off), or at least friction", |x| {
             x == 0.0 || x >= self.friction.max(0.0) && x > 0.0
         })

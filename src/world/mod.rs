@@ -4,6 +4,7 @@
 
 pub use crate::handle as arena;
 mod bytes;
+mod deformed;
 pub mod desc;
 pub mod draw;
 pub mod events;
@@ -16,6 +17,7 @@ mod step;
 mod units;
 
 use crate::handle::{Arena, Noun, WorldTag};
+pub use deformed::Deformation;
 pub use desc::{
     BodyDesc, BodyId, LinkDesc, LinkId, Response, Scheme, SkeletonDesc, SkeletonId, StiffnessRule, VelocityConvention,
     WorldDesc,

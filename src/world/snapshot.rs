@@ -34,7 +34,7 @@ use crate::response::{Response, VelocityConvention};
 use crate::team::Alone;
 
 /// What the lists below say. Another number is refused: no snapshot is ever half understood.
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
 const MAGIC: [u8; 8] = *b"isocoat\0";
 /// Offsets of the parts of the header.
 const FORMAT_AT: usize = 8;
@@ -61,7 +61,7 @@ structs! {
     }
     BodyDesc {
         rigid, response, isovalue, stiffness_scale, stiffness, friction, static_friction, viscous_friction, dissipation,
-        category, mask, may_sleep, user_data,
+        category, mask, may_sleep, bulge_width, bulge_height, user_data,
     }
     LinkDesc {
         kind, pose, twist, mass, local_center, inertia, gravity_scale, external_acceleration,

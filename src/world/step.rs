@@ -546,9 +546,7 @@ impl World {
         if a == b {
             return Err(crate::Error::Unsupported("a body does not collide with itself"));
         }
-        let motions: Vec<Motion> = (0..self.links.capacity())
-            .map(|index| if self.links.is_live(index) { self.motion_of(&self.links[index]) } else { Motion::default() })
-            .collect();
+        let motions = self.motions();
         let mut candidate = Candidate::default();
         candidate.bodies = [a.raw.index, b.raw.index];
         let bounds = [a, b].map(|body| self.bounds_of(body.index(), &motions, 0.0));

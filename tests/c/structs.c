@@ -128,7 +128,7 @@ static void sizes_that_were_never_published_are_refused(void)
     CHECK(world_desc.struct_size == 0);
     world_desc.struct_size = 0xCDCDCDCDu;
     REFUSED(isocoat_world_set_desc(world, &world_desc), argument, "begin with isocoat_world_desc_default()");
-    body_desc.struct_size = sizeof body_desc - 48;
+    body_desc.struct_size = offsetof(isocoat_body_desc, user_data);
     REFUSED(isocoat_body_set_desc(world, b.body, &body_desc), argument, "struct_size of isocoat_body_desc");
     REFUSED(isocoat_body_get_desc(world, b.body, &body_desc), argument, "struct_size of isocoat_body_desc");
     link_desc.struct_size = 1;
