@@ -149,7 +149,7 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
         body::isocoat_body_desc {
             struct_size, kind, isovalue, stiffness_scale, friction, static_friction, viscous_friction, dissipation,
             category, mask, user_data, response, stiffness_rule, static_sink, contact_frequency, damping_ratio,
-            may_sleep, reserved, blend_band, self_contact, reserved_2, volume_gain,
+            may_sleep, reserved, blend_band, self_contact, reserved_2, volume_gain, bulge_width, bulge_height,
         }
         link::isocoat_link_desc {
             struct_size, kind, pose, linear_velocity, angular_velocity, mass, local_center_of_mass, inertia,

@@ -558,10 +558,27 @@ typedef struct isocoat_body_desc {
     /** 0. */
     uint32_t reserved;
     /**
+     * Width of the band in which the fields of groups that don't blend go over into each other, over the isovalue, from
+     * 0 to 0.5; 0 leaves a crease. Only for bodies with a blend graph. Default 0.05.
+     */
+    double blend_band;
+    /** 1 if its parts that don't blend collide, when they are of different links, else 0. Default 1. */
+    uint32_t self_contact;
+    /** 0. */
+    uint32_t reserved_2;
+    /**
      * Volume control: share of each skeleton's error in volume that a step takes back, from 0 (off) to 0.5, which is
      * the best for most. See isocoat_skeleton_set_target_volume(). Default 0.
      */
     double volume_gain;
+    /**
+     * How far round its contacts its coat bulges, from 0 (not at all) to 1, over the isovalue: until the field of what
+     * it touches has fallen by so much. Seen by queries with ISOCOAT_DEFORMATION_BULGES; forces know no bulges.
+     * Default 0.
+     */
+    double bulge_width;
+    /** Height of those bulges over the most that the contact compresses the coat, from 0 to 1e6. Default 1. */
+    double bulge_height;
 } isocoat_body_desc;
 
 /**
@@ -1104,6 +1121,86 @@ ISOCOAT_MUST_USE
 isocoat_status isocoat_skeleton_get_link(const isocoat_world *world,
                                          isocoat_skeleton skeleton,
                                          isocoat_link *link);
+
+/* ---- Blend graphs ------------------------------------------------------------------------------------------------ */
+
+/**
+ * Sets how much two skeletons of a body blend: 1 adds their fields, with 0 the larger counts. New bodies blend all
+ * over. Skeletons of different links collide, as far as they don't blend, if isocoat_body_desc::self_contact is 1; but
+ * not in the territory of a third that blends with both.
+ *
+ * - world: not NULL.
+ * - a, b: two skeletons of one body.
+ * - weight: from 0 to 1.
+ * - duration: time that the change takes, in s; 0 for at once.
+ *
+ * Errors: INVALID_HANDLE, OUT_OF_RANGE, UNSUPPORTED (skeletons of two bodies; the same skeleton; a graph with more than
+ * 4096 groups of skeletons that all blend). Threads: changes the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_skeleton_set_blend(isocoat_world *world,
+                                          isocoat_skeleton a,
+                                          isocoat_skeleton b,
+                                          double weight,
+                                          double duration);
+
+/**
+ * How much two skeletons of a body blend now.
+ *
+ * - world: not NULL.
+ * - a, b: two skeletons of one body.
+ * - weight: receives the weight, from 0 to 1; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, UNSUPPORTED. Threads: reads the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_skeleton_get_blend(const isocoat_world *world,
+                                          isocoat_skeleton a,
+                                          isocoat_skeleton b,
+                                          double *weight);
+
+/**
+ * Lets exactly those skeletons of a body blend that are of the same link, or of two links that are joined; also those
+ * created later. Weights set before are forgotten.
+ *
+ * - world: not NULL.
+ * - body: the body.
+ * - joints: 2 handles a joint, links of the body; not NULL unless count is 0.
+ * - count: number of joints.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, UNSUPPORTED (a link of another body; a link joined to itself; a graph with
+ * more than 4096 groups of skeletons that all blend). Threads: changes the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_body_blend_neighbours(isocoat_world *world,
+                                             isocoat_body body,
+                                             const isocoat_link *joints,
+                                             size_t count);
+
+/**
+ * Lets all skeletons of a body blend, as in the beginning.
+ *
+ * - world: not NULL.
+ * - body: the body.
+ *
+ * Errors: INVALID_HANDLE. Threads: changes the world.
+ */
+ISOCOAT_MUST_USE isocoat_status isocoat_body_blend_all(isocoat_world *world, isocoat_body body);
+
+/**
+ * Says whether two skeletons of a body may collide where they don't blend; they may, unless told otherwise.
+ *
+ * - world: not NULL.
+ * - a, b: two skeletons of one body.
+ * - enabled: whether they may collide.
+ *
+ * Errors: INVALID_HANDLE, UNSUPPORTED. Threads: changes the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_skeleton_set_pair_contact(isocoat_world *world,
+                                                 isocoat_skeleton a,
+                                                 isocoat_skeleton b,
+                                                 bool enabled);
 
 /* ---- Motion of one link ------------------------------------------------------------------------------------------ */
 
@@ -1670,6 +1767,19 @@ ISOCOAT_MUST_USE isocoat_status isocoat_world_restore(isocoat_world *world, cons
 
 /* ---- Queries ----------------------------------------------------------------------------------------------------- */
 
+/**
+ * Which shape of a body a query sees: an ISOCOAT_DEFORMATION_ value. Contacts are those at the present poses, with all
+ * enabled bodies whose masks agree; the pair filter is not asked. A rigid body keeps its shape.
+ */
+typedef uint32_t isocoat_deformation;
+
+/** The coat as if it touched nothing. */
+#define ISOCOAT_DEFORMATION_NONE 0u
+/** Flattened along its contact surfaces with other bodies. */
+#define ISOCOAT_DEFORMATION_CONTACT 1u
+/** Flattened, and bulging round its contacts as isocoat_body_desc::bulge_width says. */
+#define ISOCOAT_DEFORMATION_BULGES 2u
+
 /** Where a ray meets a coat. */
 typedef struct isocoat_ray_hit {
     /** The body. */
@@ -1723,6 +1833,30 @@ isocoat_status isocoat_body_evaluate_field(const isocoat_world *world,
                                            double *gradients);
 
 /**
+ * isocoat_body_evaluate_field() of a body's shape in contact: f with what contacts add to it. Its surface is where f
+ * equals the body's isovalue; away from contacts f is the same to the bit.
+ *
+ * - world: not NULL.
+ * - body: the body.
+ * - deformation: which shape, an ISOCOAT_DEFORMATION_ value.
+ * - points: 3 * count doubles, in m, finite; not NULL unless count is 0.
+ * - count: number of points.
+ * - values: receives count doubles; NULL if not wanted. Must not overlap points or gradients.
+ * - gradients: receives 3 * count doubles, the gradients in the world's axes, in 1/m; NULL if not wanted. Must not
+ *   overlap points.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE. Threads: reads the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_body_evaluate_field_deformed(const isocoat_world *world,
+                                                    isocoat_body body,
+                                                    isocoat_deformation deformation,
+                                                    const double *points,
+                                                    size_t count,
+                                                    double *values,
+                                                    double *gradients);
+
+/**
  * The contacts that two bodies would have at their present poses. Changes nothing, and asks neither categories nor the
  * pair filter.
  *
@@ -1769,6 +1903,31 @@ isocoat_status isocoat_world_cast_ray(const isocoat_world *world,
                                       bool *found);
 
 /**
+ * isocoat_world_cast_ray() against the bodies' shapes in contact. Where the field of another body reaches, a chord
+ * shorter than 1/1024 of a radius of influence may be missed.
+ *
+ * - world: not NULL.
+ * - origin: 3 doubles, in m, finite; not NULL. A ray that starts inside a coat meets it at distance 0.
+ * - direction: 3 doubles, of any length but 0, finite; not NULL.
+ * - max_distance: length of the ray, in m, at least 0; may be infinite.
+ * - mask: bodies whose category has a bit of it are looked at.
+ * - deformation: which shapes, an ISOCOAT_DEFORMATION_ value.
+ * - hit: receives where it meets, if it does; not NULL.
+ * - found: receives whether it meets a coat; not NULL.
+ *
+ * Errors: INVALID_ARGUMENT, OUT_OF_RANGE. Threads: reads the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_world_cast_ray_deformed(const isocoat_world *world,
+                                               const double origin[3],
+                                               const double direction[3],
+                                               double max_distance,
+                                               uint64_t mask,
+                                               isocoat_deformation deformation,
+                                               isocoat_ray_hit *hit,
+                                               bool *found);
+
+/**
  * The enabled bodies whose coat comes within a distance of a point, in the order of their handles.
  *
  * - world: not NULL.
@@ -1807,6 +1966,26 @@ isocoat_status isocoat_body_closest_point(const isocoat_world *world,
                                           const double point[3],
                                           isocoat_surface_point *closest,
                                           bool *found);
+
+/**
+ * isocoat_body_closest_point() of a body's shape in contact.
+ *
+ * - world: not NULL.
+ * - body: the body; a disabled one is not deformed.
+ * - point: 3 doubles, in m, finite; not NULL. It may be inside.
+ * - deformation: which shape, an ISOCOAT_DEFORMATION_ value.
+ * - closest: receives the closest point, if there is one; not NULL.
+ * - found: receives whether there is one: not for a body without enabled skeletons; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE. Threads: reads the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_body_closest_point_deformed(const isocoat_world *world,
+                                                   isocoat_body body,
+                                                   const double point[3],
+                                                   isocoat_deformation deformation,
+                                                   isocoat_surface_point *closest,
+                                                   bool *found);
 
 /**
  * The seeds of a skeleton, always in the same order: samples sent out from it until they meet the surface, or the

@@ -318,28 +318,30 @@ public:
     void blend_all() { check(isocoat_body_blend_all(world_, raw_)); }
 
     /* The field at many points; values and gradients are as long as points, or empty when not wanted. */
-    void evaluate_field(span<const vec3> points, span<double> values, span<vec3> gradients = {}) const
+    void evaluate_field(span<const vec3> points, span<double> values, span<vec3> gradients = {},
+                        isocoat_deformation deformation = ISOCOAT_DEFORMATION_NONE) const
     {
         if ((!values.empty() && values.size() != points.size()) ||
             (!gradients.empty() && gradients.size() != points.size()))
             throw error(ISOCOAT_ERROR_INVALID_ARGUMENT, "values and gradients must be as long as points, or empty");
-        check(isocoat_body_evaluate_field(world_, raw_, points.empty() ? nullptr : points.data()->data(),
-                                          points.size(), values.data(),
-                                          gradients.empty() ? nullptr : gradients.data()->data()));
+        check(isocoat_body_evaluate_field_deformed(
+            world_, raw_, deformation, points.empty() ? nullptr : points.data()->data(), points.size(), values.data(),
+            gradients.empty() ? nullptr : gradients.data()->data()));
     }
     /* The field at one point. */
-    double field(const vec3 &point) const
+    double field(const vec3 &point, isocoat_deformation deformation = ISOCOAT_DEFORMATION_NONE) const
     {
         double value = 0.0;
-        check(isocoat_body_evaluate_field(world_, raw_, point.data(), 1, &value, nullptr));
+        check(isocoat_body_evaluate_field_deformed(world_, raw_, deformation, point.data(), 1, &value, nullptr));
         return value;
     }
     /* The closest point of the surface; none for a body without enabled skeletons. */
-    std::optional<surface_point> closest_point(const vec3 &point) const
+    std::optional<surface_point> closest_point(const vec3 &point,
+                                               isocoat_deformation deformation = ISOCOAT_DEFORMATION_NONE) const
     {
         surface_point closest{};
         bool found = false;
-        check(isocoat_body_closest_point(world_, raw_, point.data(), &closest, &found));
+        check(isocoat_body_closest_point_deformed(world_, raw_, point.data(), deformation, &closest, &found));
         return found ? std::optional<surface_point>(closest) : std::nullopt;
     }
 };
@@ -496,11 +498,13 @@ public:
         });
     }
     std::optional<ray_hit> cast_ray(const vec3 &origin, const vec3 &direction, double max_distance,
-                                    std::uint64_t mask = UINT64_MAX) const
+                                    std::uint64_t mask = UINT64_MAX,
+                                    isocoat_deformation deformation = ISOCOAT_DEFORMATION_NONE) const
     {
         ray_hit hit{};
         bool found = false;
-        check(isocoat_world_cast_ray(get(), origin.data(), direction.data(), max_distance, mask, &hit, &found));
+        check(isocoat_world_cast_ray_deformed(get(), origin.data(), direction.data(), max_distance, mask, deformation,
+                                              &hit, &found));
         return found ? std::optional<ray_hit>(hit) : std::nullopt;
     }
     std::vector<body> overlap_sphere(const vec3 &center, double radius, std::uint64_t mask = UINT64_MAX) const

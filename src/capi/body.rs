@@ -85,6 +85,12 @@ pub struct isocoat_body_desc {
     /// Volume control: share of each skeleton's error in volume that a step takes back, from 0 (off) to 0.5, which is
     /// the best for most. See isocoat_skeleton_set_target_volume(). Default 0.
     pub volume_gain: f64,
+    /// How far round its contacts its coat bulges, from 0 (not at all) to 1, over the isovalue: until the field of what
+    /// it touches has fallen by so much. Seen by queries with ISOCOAT_DEFORMATION_BULGES; forces know no bulges.
+    /// Default 0.
+    pub bulge_width: f64,
+    /// Height of those bulges over the most that the contact compresses the coat, from 0 to 1e6. Default 1.
+    pub bulge_height: f64,
 }
 
 // SAFETY: `repr(C)`, the size first, numbers and a pointer that is never followed.
@@ -134,6 +140,8 @@ impl From<&BodyDesc> for isocoat_body_desc {
             self_contact: desc.self_contact.into(),
             reserved_2: 0,
             volume_gain: desc.volume_gain,
+            bulge_width: desc.bulge_width,
+            bulge_height: desc.bulge_height,
         }
     }
 }
@@ -170,6 +178,8 @@ impl isocoat_body_desc {
             self_contact: flag("self_contact", self.self_contact)?,
             may_sleep: flag("may_sleep", self.may_sleep)?,
             volume_gain: self.volume_gain,
+            bulge_width: self.bulge_width,
+            bulge_height: self.bulge_height,
         })
     }
 }

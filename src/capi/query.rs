@@ -7,8 +7,9 @@ use super::guard::{isocoat_world, read};
 use super::handle::{isocoat_body, isocoat_link, isocoat_skeleton};
 use super::pointer::{Count, List, Out, disjoint, read_vector, slice, slice_mut};
 use super::report::isocoat_contact;
-use super::status::isocoat_status;
-use super::world::{isocoat_scheme, scheme_from_c};
+use super::status::{Checked, isocoat_status};
+use super::world::{isocoat_scheme, scheme_from_c, unknown};
+use crate::world::Deformation;
 use crate::world::query::{RayHit, SurfacePoint};
 
 /// Where a ray meets a coat.
@@ -70,6 +71,25 @@ impl From<SurfacePoint> for isocoat_surface_point {
     }
 }
 
+/// Which shape of a body a query sees: an ISOCOAT_DEFORMATION_ value. Contacts are those at the present poses, with all
+/// enabled bodies whose masks agree; the pair filter is not asked. A rigid body keeps its shape.
+pub type isocoat_deformation = u32;
+/// The coat as if it touched nothing.
+pub const ISOCOAT_DEFORMATION_NONE: isocoat_deformation = 0;
+/// Flattened along its contact surfaces with other bodies.
+pub const ISOCOAT_DEFORMATION_CONTACT: isocoat_deformation = 1;
+/// Flattened, and bulging round its contacts as isocoat_body_desc::bulge_width says.
+pub const ISOCOAT_DEFORMATION_BULGES: isocoat_deformation = 2;
+
+fn deformation_from_c(deformation: isocoat_deformation) -> Checked<Deformation> {
+    match deformation {
+        ISOCOAT_DEFORMATION_NONE => Ok(Deformation::None),
+        ISOCOAT_DEFORMATION_CONTACT => Ok(Deformation::Contact),
+        ISOCOAT_DEFORMATION_BULGES => Ok(Deformation::Bulges),
+        other => Err(unknown("deformation", other, "ISOCOAT_DEFORMATION_", 2)),
+    }
+}
+
 /// The field of a body at points of the world: f = sum of F(distance) over its skeletons. The surface is where f equals
 /// the body's isovalue; inside, f is larger.
 ///
@@ -92,6 +112,36 @@ pub unsafe extern "C" fn isocoat_body_evaluate_field(
     values: *mut f64,
     gradients: *mut f64,
 ) -> isocoat_status {
+    // SAFETY: as the caller's lines say.
+    unsafe {
+        isocoat_body_evaluate_field_deformed(world, body, ISOCOAT_DEFORMATION_NONE, points, count, values, gradients)
+    }
+}
+
+/// isocoat_body_evaluate_field() of a body's shape in contact: f with what contacts add to it. Its surface is where f
+/// equals the body's isovalue; away from contacts f is the same to the bit.
+///
+/// - world: not NULL.
+/// - body: the body.
+/// - deformation: which shape, an ISOCOAT_DEFORMATION_ value.
+/// - points: 3 * count doubles, in m, finite; not NULL unless count is 0.
+/// - count: number of points.
+/// - values: receives count doubles; NULL if not wanted. Must not overlap points or gradients.
+/// - gradients: receives 3 * count doubles, the gradients in the world's axes, in 1/m; NULL if not wanted. Must not
+///   overlap points.
+///
+/// Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE. Threads: reads the world.
+#[must_use]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn isocoat_body_evaluate_field_deformed(
+    world: *const isocoat_world,
+    body: isocoat_body,
+    deformation: isocoat_deformation,
+    points: *const f64,
+    count: size_t,
+    values: *mut f64,
+    gradients: *mut f64,
+) -> isocoat_status {
     // SAFETY: the pointers are NULL or as their lines say; overlap is refused before the slices are used.
     unsafe {
         read(world, |inner| {
@@ -100,7 +150,8 @@ pub unsafe extern "C" fn isocoat_body_evaluate_field(
             let points = slice(points.cast::<[f64; 3]>(), count, "points")?;
             let values = slice_mut(values, count, "values")?;
             let gradients = slice_mut(gradients.cast::<[f64; 3]>(), count, "gradients")?;
-            Ok(inner.world.evaluate_field(body.into(), points, values, gradients)?)
+            let deformation = deformation_from_c(deformation)?;
+            Ok(inner.world.evaluate_field_deformed(body.into(), points, values, gradients, deformation)?)
         })
     }
 }
@@ -165,12 +216,57 @@ pub unsafe extern "C" fn isocoat_world_cast_ray(
     hit: *mut isocoat_ray_hit,
     found: *mut bool,
 ) -> isocoat_status {
+    // SAFETY: as the caller's lines say.
+    unsafe {
+        isocoat_world_cast_ray_deformed(
+            world,
+            origin,
+            direction,
+            max_distance,
+            mask,
+            ISOCOAT_DEFORMATION_NONE,
+            hit,
+            found,
+        )
+    }
+}
+
+/// isocoat_world_cast_ray() against the bodies' shapes in contact. Where the field of another body reaches, a chord
+/// shorter than 1/1024 of a radius of influence may be missed.
+///
+/// - world: not NULL.
+/// - origin: 3 doubles, in m, finite; not NULL. A ray that starts inside a coat meets it at distance 0.
+/// - direction: 3 doubles, of any length but 0, finite; not NULL.
+/// - max_distance: length of the ray, in m, at least 0; may be infinite.
+/// - mask: bodies whose category has a bit of it are looked at.
+/// - deformation: which shapes, an ISOCOAT_DEFORMATION_ value.
+/// - hit: receives where it meets, if it does; not NULL.
+/// - found: receives whether it meets a coat; not NULL.
+///
+/// Errors: INVALID_ARGUMENT, OUT_OF_RANGE. Threads: reads the world.
+///
+/// <!--
+/// cbindgen:ptrs-as-arrays=[[origin;3], [direction;3]]
+/// -->
+#[must_use]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn isocoat_world_cast_ray_deformed(
+    world: *const isocoat_world,
+    origin: *const f64,
+    direction: *const f64,
+    max_distance: f64,
+    mask: u64,
+    deformation: isocoat_deformation,
+    hit: *mut isocoat_ray_hit,
+    found: *mut bool,
+) -> isocoat_status {
     // SAFETY: the pointers are NULL or as their lines say.
     unsafe {
         read(world, |inner| {
             let (origin, direction) = (read_vector(origin, "origin")?, read_vector(direction, "direction")?);
             let (hit, found) = (Out::new(hit, "hit")?, Out::new(found, "found")?);
-            let first = inner.world.cast_ray(&origin, &direction, max_distance, mask)?;
+            let deformation = deformation_from_c(deformation)?;
+            let first = inner.world.cast_ray_deformed(&origin, &direction, max_distance, mask, deformation)?;
             found.put(first.is_some());
             if let Some(first) = first {
                 hit.put(first.into());
@@ -239,12 +335,40 @@ pub unsafe extern "C" fn isocoat_body_closest_point(
     closest: *mut isocoat_surface_point,
     found: *mut bool,
 ) -> isocoat_status {
+    // SAFETY: as the caller's lines say.
+    unsafe { isocoat_body_closest_point_deformed(world, body, point, ISOCOAT_DEFORMATION_NONE, closest, found) }
+}
+
+/// isocoat_body_closest_point() of a body's shape in contact.
+///
+/// - world: not NULL.
+/// - body: the body; a disabled one is not deformed.
+/// - point: 3 doubles, in m, finite; not NULL. It may be inside.
+/// - deformation: which shape, an ISOCOAT_DEFORMATION_ value.
+/// - closest: receives the closest point, if there is one; not NULL.
+/// - found: receives whether there is one: not for a body without enabled skeletons; not NULL.
+///
+/// Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE. Threads: reads the world.
+///
+/// <!--
+/// cbindgen:ptrs-as-arrays=[[point;3]]
+/// -->
+#[must_use]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn isocoat_body_closest_point_deformed(
+    world: *const isocoat_world,
+    body: isocoat_body,
+    point: *const f64,
+    deformation: isocoat_deformation,
+    closest: *mut isocoat_surface_point,
+    found: *mut bool,
+) -> isocoat_status {
     // SAFETY: the pointers are NULL or as their lines say.
     unsafe {
         read(world, |inner| {
             let point = read_vector(point, "point")?;
             let (closest, found) = (Out::new(closest, "closest")?, Out::new(found, "found")?);
-            let point = inner.world.closest_point(body.into(), &point)?;
+            let point = inner.world.closest_point_deformed(body.into(), &point, deformation_from_c(deformation)?)?;
             found.put(point.is_some());
             if let Some(point) = point {
                 closest.put(point.into());

@@ -168,6 +168,21 @@ pub fn find(pair: &Pair, i: usize, j: usize, from: &Approach) -> Option<Deepest>
     (found.sum > touch(pair)).then_some(found)
 }
 
+/// The highest `σ` on the whole contact surface: the most that the two coats together are compressed, in units of
+/// field. Zero without contact.
+pub fn greatest(pair: &Pair) -> f64 {
+    let mut greatest = 0.0_f64;
+    for i in 0..pair.a.skeletons.len() {
+        for j in 0..pair.b.skeletons.len() {
+            let from = approach(pair, i, j);
+            if from.distance < pair.a.reach[i] + pair.b.reach[j] {
+                greatest = find(pair, i, j, &from).map_or(greatest, |found| greatest.max(found.sum));
+            }
+        }
+    }
+    greatest
+}
+
 /// The least `σ` that counts: a touch shallower than what rounding makes of the fields has no surface to integrate.
 fn touch(pair: &Pair) -> f64 {
     1e-12 * (pair.a.isovalue + pair.b.isovalue)

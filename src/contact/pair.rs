@@ -195,6 +195,11 @@ impl Pair {
         };
     }
 
+    /// Each side's share of the stiffness, `w_a` and `w_b`: that of a rigid side is 1.
+    pub fn shares(&self) -> [f64; 2] {
+        [self.wa, self.wb]
+    }
+
     /// Puts all skeletons where their links are; the frame's origin goes to the centre of mass of link `lead`.
     pub fn place(&mut self, motions: &[Motion], lead: u32) {
         self.origin = motions[lead as usize].center;

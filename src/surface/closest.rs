@@ -94,7 +94,7 @@ fn across(shape: &Shape) -> Vec3 {
 
 /// Directions in which to look for the surface from inside: away from each skeleton, down the field, and a fixed fan
 /// of axes and diagonals.
-fn outward(coat: &Coat, p: &Vec3) -> Vec<Vec3> {
+pub(super) fn outward(coat: &Coat, p: &Vec3) -> Vec<Vec3> {
     let away = coat.skeletons.iter().map(|k| k.shape.closest(p).normal);
     let downhill = -coat.excess_gradient(p).1;
     let fan = (0..27).map(|i| Vec3::new(f64::from(i % 3 - 1), f64::from(i / 3 % 3 - 1), f64::from(i / 9 - 1)));
@@ -103,7 +103,7 @@ fn outward(coat: &Coat, p: &Vec3) -> Vec<Vec3> {
 
 /// Directions in which to look from outside: to each skeleton, between the isolated surfaces of neighbours, and to
 /// where a skeleton comes close to another that is close to `p`, as a blend bulges there.
-fn toward(coat: &Coat, p: &Vec3) -> Vec<Vec3> {
+pub(super) fn toward(coat: &Coat, p: &Vec3) -> Vec<Vec3> {
     const PAIRED: usize = 8;
     let mut targets: Vec<Vec3> = coat.skeletons.iter().map(|k| on_isolated(k, p)).collect();
     for a in coat.skeletons.iter().take(PAIRED) {
@@ -117,7 +117,7 @@ fn toward(coat: &Coat, p: &Vec3) -> Vec<Vec3> {
 }
 
 /// Three rings of directions round an axis.
-fn cone(axis: &Vec3) -> impl Iterator<Item = Vec3> {
+pub(super) fn cone(axis: &Vec3) -> impl Iterator<Item = Vec3> {
     let (axis, (e1, e2)) = (*axis, tangents(axis));
     (0..24).map(move |k| {
         let (sine, cosine) = libm::sincos(f64::from(k % 8) * std::f64::consts::FRAC_PI_4);

@@ -1,6 +1,8 @@
-//! The surface of a coat as others see it: [`ray`] finds where a ray meets it, [`closest`] where it is nearest.
+//! The surface of a coat as others see it: [`ray`] finds where a ray meets it, [`closest`] where it is nearest,
+//! [`deformed`] does both for a coat that others press on.
 
 pub mod closest;
+pub mod deformed;
 pub mod ray;
 
 use crate::math::Vec3;

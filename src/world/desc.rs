@@ -143,6 +143,11 @@ pub struct BodyDesc {
     /// Volume control: share of each skeleton's error in volume that a step takes back, from 0 (off) to 0.5, which is
     /// the best for most. See [`World::set_skeleton_target_volume`](super::World::set_skeleton_target_volume).
     pub volume_gain: f64,
+    /// How far round its contacts its coat bulges, from 0 (not at all) to 1, over the isovalue: until the obstacle's
+    /// field has fallen by so much. For queries with [`Deformation::Bulges`](super::Deformation); forces know no bulges.
+    pub bulge_width: f64,
+    /// Height of those bulges over the most that the contact compresses the coat, at least 0.
+    pub bulge_height: f64,
     /// The host's own value.
     pub user_data: usize,
 }
@@ -165,6 +170,8 @@ impl Default for BodyDesc {
             self_contact: true,
             may_sleep: true,
             volume_gain: 0.0,
+            bulge_width: 0.0,
+            bulge_height: 1.0,
             user_data: 0,
         }
     }
@@ -190,6 +197,8 @@ impl BodyDesc {
         require("blend_band", self.blend_band, "from 0 to 0.5", |x| (0.0..=0.5).contains(&x))?;
         not_negative("dissipation", self.dissipation)?;
         require("volume_gain", self.volume_gain, "from 0 (off) to 0.5", |x| (0.0..=0.5).contains(&x))?;
+        require("bulge_width", self.bulge_width, "from 0 to 1", |x| (0.0..=1.0).contains(&x))?;
+        require("bulge_height", self.bulge_height, "from 0 to 1e6", |x| (0.0..=1e6).contains(&x))?;
         require("static_friction", self.static_friction, "0 (off), or at least friction", |x| {
             x == 0.0 || x >= self.friction.max(0.0) && x > 0.0
         })

@@ -39,6 +39,13 @@ impl World {
         motion
     }
 
+    /// The motions of all links, by their slots.
+    pub(super) fn motions(&self) -> Vec<Motion> {
+        let motion =
+            |index| if self.links.is_live(index) { self.motion_of(&self.links[index]) } else { Motion::default() };
+        (0..self.links.capacity()).map(motion).collect()
+    }
+
     /// The enabled skeletons of a body, with the slots of their links and their own.
     pub(super) fn skeletons_of<'a>(&'a self, body: &'a Body) -> impl Iterator<Item = Part<'a>> + 'a {
         let enabled_links = body.links.iter().filter(|link| self.links[**link as usize].enabled);

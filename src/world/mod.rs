@@ -5,6 +5,7 @@
 pub use crate::handle as arena;
 mod blend;
 mod bytes;
+mod deformed;
 pub mod desc;
 pub mod draw;
 pub mod events;
@@ -18,6 +19,7 @@ mod units;
 mod volume;
 
 use crate::handle::{Arena, Noun, WorldTag};
+pub use deformed::Deformation;
 pub use desc::{
     BodyDesc, BodyId, LinkDesc, LinkId, Response, Scheme, SkeletonDesc, SkeletonId, StiffnessRule, VelocityConvention,
     WorldDesc,

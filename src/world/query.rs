@@ -1,10 +1,10 @@
 //! Questions between steps: fields, rays, overlaps, closest points, seeds.
 
-use super::{Body, BodyId, LinkId, SkeletonId, World};
+use super::{Body, BodyId, Deformation, LinkId, SkeletonId, World};
 use crate::coat::{Coat, seeds, territory};
 use crate::error::{Error, Result, out_of_range, require, require_finite};
-use crate::field::lanes;
 use crate::math::{Pose, Vec3};
+use crate::surface::deformed::Deformed;
 use crate::surface::{SurfaceHit, closest, ray};
 
 /// Where a ray meets a coat.
@@ -71,10 +71,16 @@ impl PosedCoat {
 impl World {
     /// The enabled skeletons of a body at the present poses, in a frame at its first link.
     pub(super) fn posed_coat(&self, body: usize) -> PosedCoat {
+        let first = self.bodies[body].links.first();
+        self.posed_coat_in(body, first.map_or(Vec3::zeros(), |link| self.links[*link as usize].desc.pose.position))
+    }
+
+    /// The same in a frame at `origin`.
+    pub(super) fn posed_coat_in(&self, body: usize, origin: Vec3) -> PosedCoat {
         let body = &self.bodies[body];
         let poses = || body.links.iter().map(|index| self.links[*index as usize].desc.pose);
         let mut posed = PosedCoat::default();
-        posed.coat.origin = poses().next().map_or(Vec3::zeros(), |pose| pose.position);
+        posed.coat.origin = origin;
         self.fill_coat(body, poses(), &mut posed);
         posed
     }
@@ -126,6 +132,18 @@ impl World {
         values: Option<&mut [f64]>,
         gradients: Option<&mut [[f64; 3]]>,
     ) -> Result<()> {
+        self.evaluate_field_deformed(body, points, values, gradients, Deformation::None)
+    }
+
+    /// [`World::evaluate_field`] of a body's shape as `deformation` says. Away from contacts the same to the bit.
+    pub fn evaluate_field_deformed(
+        &self,
+        body: BodyId,
+        points: &[[f64; 3]],
+        values: Option<&mut [f64]>,
+        gradients: Option<&mut [[f64; 3]]>,
+        deformation: Deformation,
+    ) -> Result<()> {
         self.bodies.get(body)?;
         let lengths = [values.as_ref().map(|out| out.len()), gradients.as_ref().map(|out| out.len())];
         if lengths.iter().flatten().any(|length| *length != points.len()) {
@@ -134,22 +152,29 @@ impl World {
         if let Some(p) = points.iter().find(|p| !p.iter().all(|x| x.is_finite())) {
             return Err(out_of_range("point", format_args!("({}, {}, {})", p[0], p[1], p[2]), "finite"));
         }
-        let posed = self.posed_coat(body.index());
-        let localise = |p: &[f64; 3]| posed.localise(&Vec3::from(*p));
-        if posed.coat.graph.is_complete() {
-            let local: Vec<[f64; 3]> = points.iter().map(|p| localise(p).into()).collect();
-            lanes::evaluate(&posed.coat.skeletons, &local, values, gradients);
+        let (Deformed { coat, obstacles }, _) = self.deformed_coat(body.index(), deformation);
+        let local: Vec<[f64; 3]> = points.iter().map(|p| (Vec3::from(*p) - coat.origin).into()).collect();
+        if obstacles.is_empty() {
+            coat.evaluate(&local, values, gradients);
             return Ok(());
         }
-        let (mut values, mut gradients) = (values, gradients);
-        for (index, p) in points.iter().enumerate() {
-            let (excess, gradient) = posed.coat.excess_gradient(&localise(p));
-            if let Some(values) = &mut values {
-                values[index] = excess + posed.coat.isovalue;
-            }
-            if let Some(gradients) = &mut gradients {
-                gradients[index] = gradient.into();
-            }
+        // The terms need both.
+        let (mut own_values, mut own_gradients) = (Vec::new(), Vec::new());
+        let values = values.unwrap_or_else(|| {
+            own_values.resize(points.len(), 0.0);
+            &mut own_values
+        });
+        let gradients = gradients.unwrap_or_else(|| {
+            own_gradients.resize(points.len(), [0.0; 3]);
+            &mut own_gradients
+        });
+        coat.evaluate(&local, Some(&mut *values), Some(&mut *gradients));
+        let deformed = Deformed { coat, obstacles };
+        for ((p, value), gradient) in local.iter().zip(values).zip(gradients) {
+            let slope = Vec3::from(*gradient);
+            let term = deformed.term(&Vec3::from(*p), &(*value - deformed.coat.isovalue, slope));
+            *value += term.0;
+            *gradient = (slope + term.1).into();
         }
         Ok(())
     }
@@ -159,6 +184,18 @@ impl World {
     /// `direction` needs no unit length; `max_distance` \[m\] is at least 0 and may be infinite. A ray that starts
     /// inside a coat meets it at distance 0. Of coats at the same distance, the first body in the order of ids wins.
     pub fn cast_ray(&self, origin: &Vec3, direction: &Vec3, max_distance: f64, mask: u64) -> Result<Option<RayHit>> {
+        self.cast_ray_deformed(origin, direction, max_distance, mask, Deformation::None)
+    }
+
+    /// [`World::cast_ray`] against the shapes of bodies as `deformation` says.
+    pub fn cast_ray_deformed(
+        &self,
+        origin: &Vec3,
+        direction: &Vec3,
+        max_distance: f64,
+        mask: u64,
+        deformation: Deformation,
+    ) -> Result<Option<RayHit>> {
         require_finite("ray origin", origin)?;
         require_finite("ray direction", direction)?;
         // Scaled first, so that no square overflows or vanishes.
@@ -172,7 +209,15 @@ impl World {
         let mut first = None;
         for body in self.bodies_of(mask) {
             let posed = self.posed_coat(body);
-            let Some(hit) = ray::cast(&posed.coat, &posed.localise(origin), &direction, length) else { continue };
+            let local = posed.localise(origin);
+            let hit = if deformation == Deformation::None {
+                ray::cast(&posed.coat, &local, &direction, length)
+            } else if ray::enters(&posed.coat, &local, &direction, length) {
+                self.deformed_coat(body, deformation).0.cast(&local, &direction, length)
+            } else {
+                None
+            };
+            let Some(hit) = hit else { continue };
             if first.is_none() || hit.distance < length {
                 length = hit.distance;
                 let (skeleton, link) = self.skeleton_and_link(posed.skeletons[hit.skeleton]);
@@ -210,13 +255,23 @@ impl World {
     /// The point of a body's surface closest to a point of the world, which may be inside; `None` for a body without
     /// enabled skeletons. Also answers for a body that is disabled as a whole.
     pub fn closest_point(&self, body: BodyId, point: &Vec3) -> Result<Option<SurfacePoint>> {
+        self.closest_point_deformed(body, point, Deformation::None)
+    }
+
+    /// [`World::closest_point`] of a body's shape as `deformation` says.
+    pub fn closest_point_deformed(
+        &self,
+        body: BodyId,
+        point: &Vec3,
+        deformation: Deformation,
+    ) -> Result<Option<SurfacePoint>> {
         self.bodies.get(body)?;
         require_finite("point", point)?;
-        let posed = self.posed_coat(body.index());
-        let hit = closest::closest(&posed.coat, &posed.localise(point));
-        Ok(hit.map(|SurfaceHit { distance, position, normal, skeleton }| {
-            let (skeleton, link) = self.skeleton_and_link(posed.skeletons[skeleton]);
-            SurfacePoint { position: posed.globalise(&position), normal, distance, link, skeleton }
+        let (deformed, skeletons) = self.deformed_coat(body.index(), deformation);
+        let origin = deformed.coat.origin;
+        Ok(deformed.closest(&(point - origin)).map(|SurfaceHit { distance, position, normal, skeleton }| {
+            let (skeleton, link) = self.skeleton_and_link(skeletons[skeleton]);
+            SurfacePoint { position: position + origin, normal, distance, link, skeleton }
         }))
     }
 

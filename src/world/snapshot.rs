@@ -63,7 +63,7 @@ structs! {
     }
     BodyDesc {
         rigid, response, isovalue, stiffness_scale, stiffness, friction, static_friction, viscous_friction, dissipation,
-        category, mask, blend_band, self_contact, may_sleep, volume_gain, user_data,
+        category, mask, blend_band, self_contact, may_sleep, volume_gain, bulge_width, bulge_height, user_data,
     }
     LinkDesc {
         kind, pose, twist, mass, local_center, inertia, gravity_scale, external_acceleration,

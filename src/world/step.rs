@@ -586,9 +586,7 @@ impl World {
         require("tolerance", tolerance, "from 1e-9 to 0.5", |x| (1e-9..=0.5).contains(&x))?;
         self.bodies.get(a)?;
         self.bodies.get(b)?;
-        let motions: Vec<Motion> = (0..self.links.capacity())
-            .map(|index| if self.links.is_live(index) { self.motion_of(&self.links[index]) } else { Motion::default() })
-            .collect();
+        let motions = self.motions();
         let mut candidate = Candidate::default();
         candidate.bodies = [a.raw.index, b.raw.index];
         let mut contacts = Vec::new();

@@ -176,6 +176,74 @@ static void rays_spheres_and_closest_points(void)
     isocoat_world_destroy(world);
 }
 
+static void shapes_in_contact(void)
+{
+    isocoat_world *world = new_world();
+    /* Equal balls of 0.1 m, 0.16 m apart: they meet in the plane between, in a circle of 0.06 m. */
+    const ball low = new_ball(world, ISOCOAT_LINK_FIXED, 0.0), high = new_ball(world, ISOCOAT_LINK_HOST, 0.16);
+    isocoat_body_desc desc = isocoat_body_desc_default();
+    isocoat_ray_hit hit;
+    isocoat_surface_point closest;
+    isocoat_deformation deformation;
+    bool found = false;
+    double value = 0.0, plain = 0.0;
+    VEC(above, 0.01, 0, 0.2);
+    VEC(down, 0, 0, -1);
+    VEC(middle, 0.03, 0, 0.08);
+    VEC(beside, 0.061, 0, 0.0795);
+
+    OK(isocoat_body_get_desc(world, low.body, &desc));
+    CHECK_NEAR(desc.bulge_width, 0.0, 0.0);
+    CHECK_NEAR(desc.bulge_height, 1.0, 0.0);
+    desc.category = 2;
+    desc.bulge_width = 1.0;
+    OK(isocoat_body_set_desc(world, low.body, &desc));
+    desc.bulge_width = 0.0;
+    OK(isocoat_body_get_desc(world, low.body, &desc));
+    CHECK_NEAR(desc.bulge_width, 1.0, 0.0);
+    desc.bulge_width = 1.5;
+    REFUSED(isocoat_body_set_desc(world, low.body, &desc), range, "bulge_width is 1.5; must be from 0 to 1");
+    desc.bulge_width = 1.0;
+    desc.bulge_height = -1.0;
+    REFUSED(isocoat_body_set_desc(world, low.body, &desc), range, "bulge_height is -1");
+
+    OK(isocoat_world_cast_ray_deformed(world, above, down, 1.0, 2, ISOCOAT_DEFORMATION_NONE, &hit, &found));
+    CHECK(found && same_body(hit.body, low.body));
+    CHECK_NEAR(hit.position[2], sqrt(0.01 - 0.0001), 1e-9);
+    for (deformation = ISOCOAT_DEFORMATION_CONTACT; deformation <= ISOCOAT_DEFORMATION_BULGES; ++deformation) {
+        OK(isocoat_world_cast_ray_deformed(world, above, down, 1.0, 2, deformation, &hit, &found));
+        CHECK(found && same_body(hit.body, low.body) && same_skeleton(hit.skeleton, low.skeleton));
+        CHECK_NEAR(hit.position[2], 0.08, 1e-9);
+        CHECK_NEAR(hit.normal[2], 1.0, 1e-9);
+        OK(isocoat_body_evaluate_field_deformed(world, low.body, deformation, middle, 1, &value, NULL));
+        CHECK_NEAR(value, 1.0, 1e-9);
+        OK(isocoat_body_closest_point_deformed(world, low.body, above, deformation, &closest, &found));
+        CHECK(found && same_link(closest.link, low.link));
+        CHECK_NEAR(closest.distance, 0.12, 1e-9);
+        CHECK_NEAR(closest.position[0], 0.01, 1e-9);
+    }
+    OK(isocoat_body_evaluate_field(world, low.body, beside, 1, &plain, NULL));
+    OK(isocoat_body_evaluate_field_deformed(world, low.body, ISOCOAT_DEFORMATION_CONTACT, beside, 1, &value, NULL));
+    CHECK(plain < 1.0 && value < 1.0);
+    OK(isocoat_body_evaluate_field_deformed(world, low.body, ISOCOAT_DEFORMATION_BULGES, beside, 1, &value, NULL));
+    CHECK(value > 1.0);
+    /* The other has no bulges. */
+    OK(isocoat_body_evaluate_field_deformed(world, high.body, ISOCOAT_DEFORMATION_BULGES, beside, 1, &value, NULL));
+    CHECK(value < 1.0);
+
+    REFUSED(isocoat_body_evaluate_field_deformed(world, low.body, 3, beside, 1, &value, NULL), argument,
+            "deformation is 3");
+    REFUSED(isocoat_world_cast_ray_deformed(world, above, down, 1.0, 2, 3, &hit, &found), argument, "deformation is 3");
+    REFUSED(isocoat_body_closest_point_deformed(world, low.body, above, 3, &closest, &found), argument,
+            "deformation is 3");
+    REFUSED(isocoat_world_cast_ray_deformed(world, NULL, down, 1.0, 2, 1, &hit, &found), argument, "origin is NULL");
+    REFUSED(isocoat_body_closest_point_deformed(world, low.body, NULL, 1, &closest, &found), argument,
+            "point is NULL");
+    REFUSED(isocoat_body_evaluate_field_deformed(world, low.body, 1, NULL, 1, &value, NULL), argument,
+            "points is NULL");
+    isocoat_world_destroy(world);
+}
+
 #define MANY 4096
 
 static void seeds_lie_on_the_surface(void)
@@ -286,6 +354,7 @@ int main(void)
     the_field_of_a_point();
     the_contact_of_two_balls();
     rays_spheres_and_closest_points();
+    shapes_in_contact();
     seeds_lie_on_the_surface();
     a_drawing_shows_what_was_asked_for();
     return verdict("queries");

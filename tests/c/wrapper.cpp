@@ -272,6 +272,8 @@ static void queries()
     CHECK(hit && std::fabs(hit->position[2] - 0.295) < 1e-9);
     CHECK(!world.cast_ray({0, 0, 5}, {0, 0, 1}, 10.0));
     CHECK(std::fabs(bodies[0].closest_point({0, 0, -1})->distance - 0.9) < 1e-9);
+    CHECK(std::fabs(bodies[0].closest_point({0, 0, -1}, ISOCOAT_DEFORMATION_BULGES)->distance - 0.9) < 1e-9);
+    CHECK(bodies[0].field({0, 0, -1}, ISOCOAT_DEFORMATION_CONTACT) == bodies[0].field({0, 0, -1}));
     CHECK(std::fabs(bodies[0].field({0.1, 0, 0}) - 1.0) < 1e-12);
     const std::vector<isocoat::vec3> points{{0.1, 0, 0}, {0, 0.05, 0}};
     std::vector<double> values(2);
