@@ -81,14 +81,16 @@ static void the_contact_of_two_balls(void)
     CHECK_NEAR(twin.force[2], -force, 1e-4 * force);
     OK(isocoat_world_collide(world, a.body, far.body, ISOCOAT_SCHEME_AUTO, 1e-6, &twin, 1, &count));
     CHECK(count == 0);
+    /* All of a body blends, unless told otherwise. */
+    count = 99;
+    OK(isocoat_world_collide(world, a.body, a.body, 0, 1e-3, &twin, 1, &count));
+    CHECK(count == 0);
 
     count = 99;
     REFUSED(isocoat_world_collide(world, a.body, b.body, 6, 1e-6, &contact, 1, &count), argument, "scheme is 6");
     REFUSED(isocoat_world_collide(world, a.body, b.body, 0, 0.0, &contact, 1, &count), range,
             "tolerance is 0; must be from 1e-9 to 0.5");
     REFUSED(isocoat_world_collide(world, a.body, b.body, 0, NAN, &contact, 1, &count), range, "tolerance is NaN");
-    REFUSED(isocoat_world_collide(world, a.body, a.body, 0, 1e-3, &contact, 1, &count), ISOCOAT_ERROR_UNSUPPORTED,
-            "itself");
     REFUSED(isocoat_world_collide(world, a.body, b.body, 0, 1e-3, NULL, 1, &count), argument, "contacts is NULL");
     REFUSED(isocoat_world_collide(world, a.body, b.body, 0, 1e-3, &contact, 1, NULL), argument, "count is NULL");
     CHECK(count == 99);
