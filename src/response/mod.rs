@@ -1,4 +1,4 @@
-//! Response: how contact forces move links.
+//! Response: how contacts and springs move links.
 
 pub mod conjugate;
 pub mod coupled;
@@ -6,6 +6,7 @@ pub mod envelope;
 pub mod explicit;
 pub mod implicit;
 pub mod mirror;
+pub mod springs;
 pub mod substep;
 pub mod substepped;
 

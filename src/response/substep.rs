@@ -1,6 +1,7 @@
 //! One sub-step: drift, evaluate the contact surfaces, kick, drift. Symplectic, of second order, with one evaluation.
 
-use crate::base::Motion;
+use super::springs;
+use crate::base::{Motion, Spring};
 use crate::clock::Clock;
 use crate::contact::candidate::Candidate;
 use crate::contact::friction;
@@ -22,6 +23,8 @@ pub struct Island {
     pub links: Vec<u32>,
     /// Positions in the list of candidates, in ascending order.
     pub candidates: Vec<u32>,
+    /// Springs between the links.
+    pub springs: Vec<Spring>,
 }
 
 /// Candidates that a worker looks at in one go.
@@ -91,6 +94,7 @@ pub fn advance(
     for link in &island.links {
         motions[*link as usize].kick(h);
     }
+    springs::kick(&island.springs, motions, h);
     work.grips.clear();
     for index in &island.candidates {
         press_candidate(&mut candidates[*index as usize], *index as usize, motions, h, work);

@@ -5,6 +5,7 @@
 //! `substep_phase`, do not move a body by more than a part of its coat, and never get coarser while a contact lasts.
 
 use super::substep::{Island, Work, advance};
+use super::springs;
 use crate::base::Motion;
 use crate::contact::candidate::Candidate;
 use crate::contact::deepest::{self, Approach};
@@ -52,6 +53,7 @@ pub fn plan(
             }
         }
     }
+    springs::add_rates(&island.springs, motions, rates);
     let mut rate2 = 0.0f64;
     for link in &island.links {
         rate2 = rate2.max(std::mem::take(&mut rates[*link as usize]));
