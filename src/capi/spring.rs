@@ -106,8 +106,8 @@ pub unsafe extern "C" fn isocoat_spring_desc_init(desc: *mut isocoat_spring_desc
     free(|| unsafe { descriptor::init(desc, size, "desc") })
 }
 
-/// Creates a spring. Bodies whose springs are stiff for the step (w dt > 0.3, with w^2 the sum of a link's
-/// stiffness / mass) are solved implicitly unless another response is asked for.
+/// Creates a spring. A body is solved implicitly, unless another response is asked for, when one of its springs is stiff
+/// for the step: stiffness * dt^2 * (1 / mass_a + 1 / mass_b) > 0.09.
 ///
 /// - world: not NULL.
 /// - desc: the spring; not NULL.

@@ -10,6 +10,7 @@ use nalgebra::{Matrix6, Vector6};
 
 use super::conjugate::Blocks;
 use super::envelope::{BLOCK, Envelope};
+use super::springs::Tie;
 use crate::base::{Inertia, Motion};
 use crate::contact::press::Material;
 use crate::math::{Mat3, Quat, Twist, Vec3, Wrench, rotate_tensor};
@@ -150,7 +151,9 @@ pub struct Coupled {
     pub groups: Vec<Group>,
     /// Points of all groups.
     pub points: Vec<Point>,
-    /// Members of all groups.
+    /// Springs.
+    pub ties: Vec<Tie>,
+    /// Members of all groups, then of all ties.
     pub members: Vec<Member>,
     masses: Vec<Matrix6<f64>>,
     mobilities: Vec<Matrix6<f64>>,
@@ -218,17 +221,19 @@ impl Coupled {
         }
     }
 
-    /// Forgets the groups.
+    /// Forgets groups and ties.
     pub fn clear(&mut self) {
         self.groups.clear();
         self.points.clear();
+        self.ties.clear();
         self.members.clear();
     }
 
-    /// Velocity of b's flesh relative to a's over a group, about its centre, for velocities `of` the links.
-    pub fn relative(&self, group: &Group, of: impl Fn(u32) -> Twist) -> Twist {
+    /// Velocity of b relative to a over the members of a group, about its centre, or of a tie, for velocities `of` the
+    /// links.
+    pub fn relative(&self, members: (usize, usize), of: impl Fn(u32) -> Twist) -> Twist {
         let mut sum = Twist::default();
-        for member in &self.members[group.members.0..group.members.1] {
+        for member in &self.members[members.0..members.1] {
             let twist = member.twist(&of(member.link));
             sum.linear += twist.linear * member.weight;
             sum.angular += twist.angular * member.weight;
@@ -236,17 +241,22 @@ impl Coupled {
         sum
     }
 
-    /// The relative velocity of a group for the unknowns `x`; `fixed` has the velocities of links without unknowns.
-    pub fn relative_of(&self, group: &Group, x: &[f64], fixed: &[Motion]) -> Twist {
-        self.relative(group, |link| match self.blocks[link as usize] {
+    /// The relative velocity over some members for the unknowns `x`; `fixed` has the velocities of links without unknowns.
+    pub fn relative_of(&self, members: (usize, usize), x: &[f64], fixed: &[Motion]) -> Twist {
+        self.relative(members, |link| match self.blocks[link as usize] {
             NONE => fixed[link as usize].twist,
             block => twist_of(x, block),
         })
     }
 
+    /// The velocities of a link in the unknowns `x`, if it has any.
+    pub fn twist_in(&self, link: u32, x: &[f64]) -> Option<Twist> {
+        Some(self.blocks[link as usize]).filter(|block| *block != NONE).map(|block| twist_of(x, block))
+    }
+
     /// What a group comes to at the unknowns `x`.
     pub fn push(&self, group: &Group, x: &[f64], fixed: &[Motion], h: f64) -> Push {
-        self.respond(group, &self.relative_of(group, x, fixed), h, None)
+        self.respond(group, &self.relative_of(group.members, x, fixed), h, None)
     }
 
     /// Solves for the velocities at the end of the step, in place; `free` has those without contact, `fixed` those of
@@ -358,13 +368,14 @@ impl Coupled {
         x.chunks_exact(BLOCK).zip(&self.masses).map(size).sum()
     }
 
-    /// The envelope that the groups need.
+    /// The envelope that groups and ties need.
     fn shape(&mut self, count: usize) {
         self.first.clear();
         self.first.extend(0..count as u32);
-        for group in &self.groups {
+        let groups = self.groups.iter().map(|group| group.members);
+        for (first, end) in groups.chain(self.ties.iter().map(|tie| tie.members)) {
             let blocks = || {
-                let members = self.members[group.members.0..group.members.1].iter();
+                let members = self.members[first..end].iter();
                 members.map(|member| self.blocks[member.link as usize]).filter(|block| *block != NONE)
             };
             let Some(lowest) = blocks().min() else { continue };
@@ -398,29 +409,49 @@ impl Coupled {
             }
         }
         let mut parts = std::mem::take(&mut self.parts);
-        parts.resize_with(self.groups.len(), Part::default);
+        let groups = self.groups.len();
+        parts.resize_with(groups + self.ties.len(), Part::default);
         let block = team.share(parts.len(), GROUPS);
-        team.each_mut(&mut parts, block, |index, part| {
-            self.work_out(&self.groups[index], x, fixed, h, with_matrix, part);
+        team.each_mut(&mut parts, block, |index, part| match self.groups.get(index) {
+            Some(group) => self.work_out(group, x, fixed, h, with_matrix, part),
+            None => self.work_out_tie(&self.ties[index - groups], x, fixed, h, with_matrix, part),
         });
-        for (index, part) in parts.iter().enumerate() {
+        for (index, part) in parts[..groups].iter().enumerate() {
             if part.push != Wrench::default() {
                 self.put(self.groups[index].members, part, h, with_matrix);
             }
+        }
+        for (index, part) in parts[groups..].iter().enumerate() {
+            self.put(self.ties[index].members, part, h, with_matrix);
         }
         self.parts = parts;
     }
 
     /// Works out a group's part of the system.
     fn work_out(&self, group: &Group, x: &[f64], fixed: &[Motion], h: f64, with_matrix: bool, part: &mut Part) {
-        let relative = self.relative_of(group, x, fixed);
+        let relative = self.relative_of(group.members, x, fixed);
         part.push = self.respond(group, &relative, h, with_matrix.then_some(&mut part.slope)).all;
         let (first, end) = group.members;
         if with_matrix && end - first <= 2 && part.push != Wrench::default() {
-            for row in 0..end - first {
-                for other in 0..=row {
-                    part.blocks[row + other] = self.block(&part.slope, first + row, first + other, h);
-                }
+            self.work_out_blocks(group.members, h, part);
+        }
+    }
+
+    /// Works out a tie's part of the system.
+    fn work_out_tie(&self, tie: &Tie, x: &[f64], fixed: &[Motion], h: f64, with_matrix: bool, part: &mut Part) {
+        let (force, ll) = tie.respond(&self.relative_of(tie.members, x, fixed).linear, h);
+        part.push = Wrench { force, torque: Vec3::zeros() };
+        if with_matrix {
+            part.slope = Slope { ll, ..Slope::default() };
+            self.work_out_blocks(tie.members, h, part);
+        }
+    }
+
+    /// Works out the blocks of at most two members.
+    fn work_out_blocks(&self, (first, end): (usize, usize), h: f64, part: &mut Part) {
+        for row in 0..end - first {
+            for other in 0..=row {
+                part.blocks[row + other] = self.block(&part.slope, first + row, first + other, h);
             }
         }
     }

@@ -1,4 +1,4 @@
-//! Implicit response: velocities and contact forces of a whole island that agree at the end of the step.
+//! Implicit response: velocities, contact forces and springs of a whole island that agree at the end of the step.
 //!
 //! Backward Euler with the contact surfaces evaluated at the end pose (docs/model.md, "Implicit response"). The
 //! velocities start as they were, with what would carry bodies into each other taken away; then, in turn, the surfaces
@@ -6,20 +6,18 @@
 //! velocities ([`coupled`](super::coupled)). When the two do not agree after a few rounds, the step is taken in two
 //! halves. Frozen at the first pose, stiff contacts would gain energy and rolling would be braked.
 
-use super::coupled::{Coupled, Grip, Group, Member, Point, Push, put_twist, twist_of};
+use super::coupled::{Coupled, Group, Member, Point, Push, put_twist, twist_of};
 use super::envelope::{BLOCK, OrderBuffers, narrow_order};
-use super::substep::{Island, PUSH_OUT, Work, bend_bristles, drift};
-use crate::base::{Inertia, Motion};
+use super::grouping::{CREEP, Grouping, RECOVERY, combinations, thicknesses, thinner};
+use super::springs::{self, Tie};
+use super::substep::{Island, Step, bend_bristles, drift};
+use crate::base::Motion;
 use crate::clock::Clock;
 use crate::contact::candidate::Candidate;
-use crate::contact::pair::Pair;
+use crate::contact::deepest;
 use crate::contact::patch::Sums;
-use crate::contact::press::{Carriers, friction_radius};
-use crate::contact::stiffness::reachable;
-use crate::contact::surface::Settings;
-use crate::contact::{deepest, patch};
+use crate::contact::press::Carriers;
 use crate::math::{Twist, Vec3, Wrench};
-use crate::team::Team;
 
 /// What the solver may spend.
 #[derive(Clone, Copy, Debug)]
@@ -38,17 +36,8 @@ const BLOCK_OF_PAIRS: usize = 16;
 /// Sweeps that take the approach out of the first guess.
 const SWEEPS: usize = 10;
 
-/// Slip velocity up to which friction grows, in thicknesses of the thinner coat a second.
-const CREEP: f64 = 0.01;
-
 /// Slip over the creep velocity at which a bristle lets go: friction is then within 2% of its most.
 const LET_GO: f64 = 5.0;
-
-/// Part of a bristle's bend that is taken back in one step.
-const RECOVERY: f64 = 0.2;
-
-/// Stiffness of a wall, over what would take up a mass within a step.
-const WALL: f64 = 1e3;
 
 /// Part of the speeds of a step below which a change between two rounds does not matter.
 const NEGLIGIBLE: f64 = 1e-4;
@@ -64,10 +53,10 @@ pub struct Solver {
     coupled: Coupled,
     free: Vec<f64>,
     x: Vec<f64>,
+    /// The unknowns by which the ties came where they are.
+    led: Vec<f64>,
     rows: Vec<Row>,
     carriers: Carriers,
-    /// The surfaces are frozen where they are.
-    last_resort: bool,
     pushes: Vec<Push>,
     /// Rounds of the last step, all halves together.
     pub rounds: u32,
@@ -95,26 +84,15 @@ struct Row {
 }
 
 /// Advances an island by `dt`.
-#[expect(clippy::too_many_arguments, reason = "an island's step touches the whole state")]
-pub fn step(
-    motions: &mut [Motion],
-    island: &Island,
-    candidates: &mut [Candidate],
-    dt: f64,
-    settings: &Settings,
-    effort: &Effort,
-    solver: &mut Solver,
-    work: &mut Work,
-    team: &Team,
-) {
+pub fn step(step: &mut Step, dt: f64, effort: &Effort, solver: &mut Solver) {
     (solver.rounds, solver.splits) = (0, 0);
-    if island.candidates.is_empty() {
-        fly(motions, island, dt);
+    if step.island.candidates.is_empty() && step.island.springs.is_empty() {
+        fly(step.motions, step.island, dt);
         return;
     }
-    solver.trial.resize(motions.len(), Motion::default());
-    solver.order_links(island, candidates, motions);
-    halves(motions, island, candidates, dt, settings, effort, effort.splits, solver, work, team);
+    solver.trial.resize(step.motions.len(), Motion::default());
+    solver.order_links(step.island, step.candidates, step.motions);
+    halves(step, dt, effort, effort.splits, solver);
 }
 
 /// Moves links that nothing touches: exact under a steady acceleration, where backward Euler would lose energy.
@@ -127,26 +105,13 @@ fn fly(motions: &mut [Motion], island: &Island, h: f64) {
 }
 
 /// Takes a step whole, or in two halves when it does not converge.
-#[expect(clippy::too_many_arguments, reason = "an island's step touches the whole state")]
-fn halves(
-    motions: &mut [Motion],
-    island: &Island,
-    candidates: &mut [Candidate],
-    dt: f64,
-    settings: &Settings,
-    effort: &Effort,
-    splits: u32,
-    solver: &mut Solver,
-    work: &mut Work,
-    team: &Team,
-) {
-    let last_resort = splits == 0;
-    if solver.attempt(motions, island, candidates, dt, settings, effort, last_resort, work, team) {
+fn halves(step: &mut Step, dt: f64, effort: &Effort, splits: u32, solver: &mut Solver) {
+    if solver.attempt(step, dt, effort, splits == 0) {
         return;
     }
     solver.splits += 1;
     for _ in 0..2 {
-        halves(motions, island, candidates, 0.5 * dt, settings, effort, splits - 1, solver, work, team);
+        halves(step, 0.5 * dt, effort, splits - 1, solver);
     }
 }
 
@@ -158,15 +123,20 @@ impl Solver {
         nodes.extend(island.links.iter().filter(|link| motions[**link as usize].is_movable()));
         nodes.sort_unstable();
         edges.clear();
+        let place = |link: &u32| nodes.binary_search(link).ok().map(|place| place as u32);
         for index in &island.candidates {
             let pair = &candidates[*index as usize].pair;
-            let place = |link: &u32| nodes.binary_search(link).ok().map(|place| place as u32);
             for a in pair.a.links.iter().filter_map(place) {
                 for b in pair.b.links.iter().filter_map(place) {
                     if a != b {
                         edges.push((a.min(b), a.max(b)));
                     }
                 }
+            }
+        }
+        for [a, b] in island.springs.iter().map(|spring| spring.links) {
+            if let (Some(a), Some(b)) = (place(&a), place(&b)) {
+                edges.push((a.min(b), a.max(b)));
             }
         }
         edges.sort_unstable();
@@ -177,42 +147,30 @@ impl Solver {
     }
 
     /// Tries a step. Unless it is the `last_resort`, nothing is changed when it fails.
-    #[expect(clippy::too_many_arguments, reason = "an island's step touches the whole state")]
-    fn attempt(
-        &mut self,
-        motions: &mut [Motion],
-        island: &Island,
-        candidates: &mut [Candidate],
-        h: f64,
-        settings: &Settings,
-        effort: &Effort,
-        last_resort: bool,
-        work: &mut Work,
-        team: &Team,
-    ) -> bool {
-        self.coupled.set_links(&self.order, motions);
+    fn attempt(&mut self, step: &mut Step, h: f64, effort: &Effort, last_resort: bool) -> bool {
+        self.coupled.set_links(&self.order, step.motions);
         self.free.clear();
         self.free.resize(self.order.len() * BLOCK, 0.0);
         for (block, link) in self.order.iter().enumerate() {
-            let motion = &motions[*link as usize];
+            let motion = &step.motions[*link as usize];
             let twist = Twist {
                 linear: motion.twist.linear + motion.acceleration * h,
                 angular: motion.twist.angular + motion.angular_acceleration * h,
             };
             put_twist(&mut self.free, block as u32, &twist);
         }
-        let mut clock = Clock::start(work.timed);
-        self.first_guess(motions, island, candidates, h, team);
-        clock.lap(&mut work.solve_time);
+        let mut clock = Clock::start(step.work.timed);
+        self.first_guess(step, h);
+        clock.lap(&mut step.work.solve_time);
         let mut converged = false;
         for _ in 0..effort.rounds {
             self.rounds += 1;
-            self.look(motions, island, candidates, h, settings, work, team);
-            clock.lap(&mut work.contact_time);
-            self.couple_all(motions, island, candidates, h);
-            let solved = self.coupled.solve(&mut self.x, &self.free, motions, h, team);
-            converged = solved && self.agrees(motions, candidates, h, effort.tolerance);
-            clock.lap(&mut work.solve_time);
+            self.look(step, h);
+            clock.lap(&mut step.work.contact_time);
+            self.couple_all(step, h, false);
+            let solved = self.coupled.solve(&mut self.x, &self.free, step.motions, h, step.team);
+            converged = solved && self.agrees(step.motions, step.candidates, h, effort.tolerance);
+            clock.lap(&mut step.work.solve_time);
             if !solved || converged {
                 break;
             }
@@ -223,20 +181,20 @@ impl Solver {
             }
             // One solve with the surfaces as they are now: what moves on is small in so short a step, and no gap closes.
             self.x.fill(0.0);
-            self.look(motions, island, candidates, h, settings, work, team);
-            clock.lap(&mut work.contact_time);
-            self.last_resort = true;
-            self.couple_all(motions, island, candidates, h);
-            self.last_resort = false;
-            self.coupled.solve(&mut self.x, &self.free, motions, h, team);
+            self.look(step, h);
+            clock.lap(&mut step.work.contact_time);
+            self.couple_all(step, h, true);
+            self.coupled.solve(&mut self.x, &self.free, step.motions, h, step.team);
         }
-        self.commit(motions, island, candidates, h);
-        clock.lap(&mut work.solve_time);
+        self.commit(step, h);
+        clock.lap(&mut step.work.solve_time);
         true
     }
 
     /// The velocities at the start of the step, without what would carry bodies into each other.
-    fn first_guess(&mut self, motions: &[Motion], island: &Island, candidates: &mut [Candidate], h: f64, team: &Team) {
+    fn first_guess(&mut self, step: &mut Step, h: f64) {
+        let Step { motions, island, candidates, team, .. } = step;
+        let motions = &**motions;
         for link in &island.links {
             self.trial[*link as usize] = motions[*link as usize];
         }
@@ -298,17 +256,8 @@ impl Solver {
     }
 
     /// Evaluates the contacts where the velocities lead.
-    #[expect(clippy::too_many_arguments, reason = "an island's step touches the whole state")]
-    fn look(
-        &mut self,
-        motions: &[Motion],
-        island: &Island,
-        candidates: &mut [Candidate],
-        h: f64,
-        settings: &Settings,
-        work: &mut Work,
-        team: &Team,
-    ) {
+    fn look(&mut self, step: &mut Step, h: f64) {
+        let Step { motions, island, candidates, settings, work, team } = step;
         for link in &island.links {
             self.trial[*link as usize] = motions[*link as usize];
         }
@@ -319,201 +268,34 @@ impl Solver {
         work.look(&self.trial, island, candidates, settings, true, team);
     }
 
-    /// Puts the contact surfaces into the system.
-    fn couple_all(&mut self, motions: &[Motion], island: &Island, candidates: &[Candidate], h: f64) {
+    /// Puts contact surfaces and springs into the system; as a `last_resort`, the surfaces frozen where they are.
+    fn couple_all(&mut self, step: &Step, h: f64, last_resort: bool) {
         self.coupled.clear();
-        for index in &island.candidates {
-            self.couple(&candidates[*index as usize], *index, h);
+        for index in &step.island.candidates {
+            let coupled = &mut self.coupled;
+            let carriers = &mut self.carriers;
+            let candidate = &step.candidates[*index as usize];
+            Grouping { coupled, carriers, trial: &self.trial, candidate, index: *index, h, last_resort }.add_all();
         }
         for index in 0..self.coupled.groups.len() {
-            let group = self.coupled.groups[index];
-            self.coupled.groups[index].base = self.coupled.relative_of(&group, &self.x, motions);
+            let members = self.coupled.groups[index].members;
+            self.coupled.groups[index].base = self.coupled.relative_of(members, &self.x, step.motions);
         }
-    }
-
-    /// Puts a candidate's contact surface into the system.
-    fn couple(&mut self, candidate: &Candidate, index: u32, h: f64) {
-        let Candidate { pair, surface, .. } = candidate;
-        let single = pair.a.only_link().is_some() && pair.b.only_link().is_some();
-        for (number, patch) in surface.patches.iter().enumerate() {
-            let nodes = &surface.nodes[patch.nodes.0..patch.nodes.1];
-            let sums = patch::sum(nodes);
-            if sums.force == Vec3::zeros() {
-                continue;
-            }
-            let grip = self.grip(candidate, patch, &sums, nodes, h);
-            let members = single.then(|| self.members(pair, &sums.center));
-            let first = self.coupled.points.len();
-            for node in nodes {
-                let load = node.force.norm();
-                if load <= 0.0 {
-                    continue;
-                }
-                let begin = self.coupled.points.len();
-                let center = if single { sums.center } else { node.position };
-                self.coupled.points.push(Point {
-                    arm: node.position - center,
-                    normal: node.force / load,
-                    load,
-                    stiffness: node.stiffness,
-                    area: node.area,
-                });
-                if !single {
-                    let members = self.members(pair, &node.position);
-                    let mut grip = grip;
-                    grip.slip += grip.spin.cross(&(node.position - sums.center));
-                    self.add_group(index, Some(number), center, (begin, begin + 1), members, candidate, grip);
-                }
-            }
-            if let Some(members) = members {
-                let points = (first, self.coupled.points.len());
-                self.add_group(index, Some(number), sums.center, points, members, candidate, grip);
-            }
+        for spring in &step.island.springs {
+            let mut tie = Tie::new(spring, &self.trial, &mut self.coupled.members);
+            tie.set_velocity(&self.coupled.relative_of(tie.members, &self.x, step.motions).linear);
+            self.coupled.ties.push(tie);
         }
-        // What must come apart, from where the step began.
-        for (i, j, approach) in &surface.overloads {
-            self.carriers.find(pair, &approach.meeting);
-            let come = self.closing(pair, approach) * h;
-            self.add_wall(candidate, index, [*i, *j], approach, -PUSH_OUT * thinner(pair, *i, *j) * h - come, h);
-        }
-        if !surface.overloads.is_empty() {
-            return;
-        }
-        for (i, j) in combinations(pair) {
-            let approach = deepest::approach(pair, i, j);
-            let gap = approach.distance - thicknesses(pair, i, j);
-            if self.last_resort {
-                // Nothing comes deeper than a coat bears, whatever its speed.
-                self.add_wall(candidate, index, [i, j], &approach, (gap + 0.5 * thinner(pair, i, j)).max(0.0), h);
-            } else if surface.patches.is_empty() {
-                // A gap that may close, so that the next round starts from a shallow touch; one without depth has no
-                // patch yet.
-                self.add_gap(candidate, index, [i, j], &approach, gap.max(0.0));
-            }
-        }
-    }
-
-    /// Dry friction of a patch.
-    fn grip(&self, candidate: &Candidate, patch: &patch::Patch, sums: &Sums, nodes: &[patch::Node], h: f64) -> Grip {
-        let Candidate { pair, material, memory, .. } = candidate;
-        if material.friction <= 0.0 && material.static_friction <= 0.0 {
-            return Grip::default();
-        }
-        let [i, j] = patch.skeletons;
-        let thickness = thinner(pair, i, j);
-        let key = [pair.a.ids[i], pair.b.ids[j]];
-        let mut grip = Grip {
-            coefficient: material.friction,
-            creep: CREEP * thickness,
-            radius: if nodes.len() == 1 { friction_radius(nodes, sums) } else { 0.0 },
-            ..Grip::default()
-        };
-        if material.static_friction > 0.0 {
-            let bristle = memory.bristles.iter().find(|bristle| bristle.key == key);
-            if bristle.is_none_or(|bristle| !bristle.sliding) {
-                grip.coefficient = material.static_friction;
-            }
-            if let Some(bristle) = bristle {
-                grip.slip = bristle.slip * (-RECOVERY / h);
-                grip.spin = sums.force.normalize() * (bristle.turn * (-RECOVERY / h));
-            }
-        }
-        grip
-    }
-
-    /// The links that carry a point; gives their range.
-    fn members(&mut self, pair: &Pair, position: &Vec3) -> (usize, usize) {
-        let first = self.coupled.members.len();
-        self.carriers.find(pair, position);
-        for (shares, sign) in [(&self.carriers.a, -1.0), (&self.carriers.b, 1.0)] {
-            for share in shares {
-                let motion = &self.trial[share.link as usize];
-                self.coupled.members.push(Member {
-                    link: share.link,
-                    weight: sign * share.weight,
-                    arm: position - (motion.center - pair.origin),
-                    turns: !matches!(motion.inertia, Inertia::Point { .. }),
-                });
-            }
-        }
-        (first, self.coupled.members.len())
-    }
-
-    #[expect(clippy::too_many_arguments, reason = "a group has this many parts")]
-    fn add_group(
-        &mut self,
-        index: u32,
-        patch: Option<usize>,
-        center: Vec3,
-        points: (usize, usize),
-        members: (usize, usize),
-        candidate: &Candidate,
-        grip: Grip,
-    ) {
-        self.coupled.groups.push(Group {
-            candidate: index,
-            patch: patch.map(|patch| patch as u32),
-            center,
-            points,
-            members,
-            material: if patch.is_some() { candidate.material } else { Default::default() },
-            grip,
-            base: Twist::default(),
-        });
-    }
-
-    /// A gap that pushes once the velocities close it, as softly as a shallow contact would.
-    fn add_gap(
-        &mut self,
-        candidate: &Candidate,
-        index: u32,
-        [i, j]: [usize; 2],
-        approach: &deepest::Approach,
-        gap: f64,
-    ) {
-        let stiffness = reachable(&candidate.pair, i, j, 0.1 * thinner(&candidate.pair, i, j)).stiffness;
-        self.add_lone(candidate, index, approach, -stiffness * gap, stiffness);
-    }
-
-    /// A wall beyond which two skeletons come no closer than `room` metres from where they are; negative room parts them.
-    fn add_wall(
-        &mut self,
-        candidate: &Candidate,
-        index: u32,
-        [i, j]: [usize; 2],
-        approach: &deepest::Approach,
-        room: f64,
-        h: f64,
-    ) {
-        let pair = &candidate.pair;
-        self.carriers.find(pair, &approach.meeting);
-        let mobility = self.carriers.mobility(&self.trial, &pair.origin, &approach.meeting);
-        let along = approach.direction.dot(&(mobility * approach.direction));
-        if along > 0.0 {
-            let stiffness = (WALL / (along * h * h)).max(reachable(pair, i, j, f64::INFINITY).stiffness);
-            self.add_lone(candidate, index, approach, -stiffness * room, stiffness);
-        }
-    }
-
-    /// How fast b comes towards a where two skeletons are closest, at the trial's velocities.
-    fn closing(&self, pair: &Pair, approach: &deepest::Approach) -> f64 {
-        -self.carriers.slip(&self.trial, &pair.origin, &approach.meeting).dot(&approach.direction)
-    }
-
-    fn add_lone(&mut self, candidate: &Candidate, index: u32, approach: &deepest::Approach, load: f64, stiffness: f64) {
-        let first = self.coupled.points.len();
-        self.coupled.points.push(Point { arm: Vec3::zeros(), normal: approach.direction, load, stiffness, area: 0.0 });
-        let members = self.members(&candidate.pair, &approach.meeting);
-        self.add_group(index, None, approach.meeting, (first, first + 1), members, candidate, Grip::default());
+        self.led.clone_from(&self.x);
     }
 
     /// Whether the contacts moved so little since they were evaluated that they are still what they were.
     fn agrees(&self, motions: &[Motion], candidates: &[Candidate], h: f64, tolerance: f64) -> bool {
-        self.coupled.groups.iter().all(|group| {
-            let now = self.coupled.relative_of(group, &self.x, motions);
+        let groups = self.coupled.groups.iter().all(|group| {
+            let now = self.coupled.relative_of(group.members, &self.x, motions);
             let change = Twist { linear: now.linear - group.base.linear, angular: now.angular - group.base.angular };
             let pair = &candidates[group.candidate as usize];
-            let speed = self.speed(group, motions, h);
+            let speed = self.speed(group.members, motions, h);
             let Some(patch) = group.patch else {
                 // A wall or a gap is exact, until it begins to push where it did not.
                 let point = &self.coupled.points[group.points.0];
@@ -530,7 +312,20 @@ impl Solver {
             let along = change.linear - patch.normal * change.linear.dot(&patch.normal);
             let across = change.linear.dot(&patch.normal).abs() + change.angular.norm() * size;
             h * across <= tolerance * depth && h * along.norm() <= tolerance * size
-        })
+        });
+        groups && self.coupled.ties.iter().all(|tie| self.tie_agrees(tie, motions, h, tolerance))
+    }
+
+    /// Whether a tie's ends came where the system took them to be. In a turn they go round, and not straight on.
+    fn tie_agrees(&self, tie: &Tie, motions: &[Motion], h: f64, tolerance: f64) -> bool {
+        let turned = |member: &Member| {
+            let turn = |x| self.coupled.twist_in(member.link, x).map_or_else(Vec3::zeros, |twist| twist.angular);
+            if member.turns { (turn(&self.x) - turn(&self.led)).norm_squared() * h * member.arm.norm() } else { 0.0 }
+        };
+        let off = self.coupled.members[tie.members.0..tie.members.1].iter().map(turned).sum::<f64>();
+        let velocity = self.coupled.relative_of(tie.members, &self.x, motions).linear;
+        h * off <= tolerance * tie.stretch(&velocity, h).abs()
+            || off <= NEGLIGIBLE * self.speed(tie.members, motions, h)
     }
 
     /// Half the width of a group's patch.
@@ -539,9 +334,9 @@ impl Solver {
         (points.iter().map(|point| point.area).sum::<f64>() / std::f64::consts::PI).sqrt()
     }
 
-    /// The speeds that are at work in a group in this step.
-    fn speed(&self, group: &Group, motions: &[Motion], h: f64) -> f64 {
-        let members = &self.coupled.members[group.members.0..group.members.1];
+    /// The speeds that are at work among some members in this step.
+    fn speed(&self, (first, end): (usize, usize), motions: &[Motion], h: f64) -> f64 {
+        let members = &self.coupled.members[first..end];
         let speed = |member: &Member| {
             let motion = &motions[member.link as usize];
             motion.acceleration.norm() * h + NEGLIGIBLE * motion.twist.at(&member.arm).norm()
@@ -550,7 +345,8 @@ impl Solver {
     }
 
     /// Moves the links by the velocities found, and hands every contact its forces.
-    fn commit(&mut self, motions: &mut [Motion], island: &Island, candidates: &mut [Candidate], h: f64) {
+    fn commit(&mut self, step: &mut Step, h: f64) {
+        let Step { motions, island, candidates, .. } = step;
         for index in &island.candidates {
             let candidate = &mut candidates[*index as usize];
             candidate.loads.clear();
@@ -564,7 +360,8 @@ impl Solver {
         for group in &self.coupled.groups {
             self.pushes.push(self.coupled.push(group, &self.x, &self.trial, h));
         }
-        if self.pushes.iter().all(|push| push.all == Wrench::default()) {
+        let untouched = self.pushes.iter().all(|push| push.all == Wrench::default());
+        if untouched && island.springs.is_empty() {
             fly(motions, island, h);
             return;
         }
@@ -580,6 +377,14 @@ impl Solver {
                 }
             }
         }
+        for tie in &self.coupled.ties {
+            let velocity = self.coupled.relative_of(tie.members, &self.x, &self.trial).linear;
+            let (force, _) = tie.respond(&velocity, h);
+            for member in &self.coupled.members[tie.members.0..tie.members.1] {
+                let force = force * (h * member.weight);
+                motions[member.link as usize].push(&Wrench { force, torque: member.arm.cross(&force) });
+            }
+        }
         let same = |a: &Group, b: &Group| (a.candidate, a.patch) == (b.candidate, b.patch);
         let mut first = 0;
         for groups in self.coupled.groups.chunk_by(same) {
@@ -592,6 +397,12 @@ impl Solver {
             candidate.loads[patch as usize] = sums;
         }
         drift(motions, island, h);
+        if let Some(fall) = springs::fall_as_one(&island.springs, &island.links, motions).filter(|_| untouched) {
+            for link in &island.links {
+                let motion = &mut motions[*link as usize];
+                motion.center -= if motion.is_movable() { fall * (0.5 * h * h) } else { Vec3::zeros() };
+            }
+        }
         for index in &island.candidates {
             let candidate = &mut candidates[*index as usize];
             if candidate.material.static_friction > 0.0 {
@@ -646,18 +457,4 @@ fn patch_sums(groups: &[Group], pushes: &[Push], points: &[Point]) -> Sums {
         sums.torque += push.pressing.torque + (group.center - sums.center).cross(&push.pressing.force);
     }
     sums
-}
-
-/// All pairs of skeletons of a pair.
-fn combinations(pair: &Pair) -> impl Iterator<Item = (usize, usize)> + use<> {
-    let (a, b) = (pair.a.skeletons.len(), pair.b.skeletons.len());
-    (0..a).flat_map(move |i| (0..b).map(move |j| (i, j)))
-}
-
-fn thinner(pair: &Pair, i: usize, j: usize) -> f64 {
-    pair.a.skeletons[i].profile.thickness.min(pair.b.skeletons[j].profile.thickness)
-}
-
-fn thicknesses(pair: &Pair, i: usize, j: usize) -> f64 {
-    pair.a.skeletons[i].profile.thickness + pair.b.skeletons[j].profile.thickness
 }

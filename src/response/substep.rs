@@ -30,6 +30,22 @@ pub struct Island {
 /// Candidates that a worker looks at in one go.
 const BLOCK: usize = 4;
 
+/// A step of an island: what moves, what is known of its contacts, and who works at it.
+pub struct Step<'a> {
+    /// All links, by slot.
+    pub motions: &'a mut [Motion],
+    /// Who is stepped.
+    pub island: &'a Island,
+    /// All candidates.
+    pub candidates: &'a mut [Candidate],
+    /// How contact surfaces are integrated.
+    pub settings: &'a Settings,
+    /// Working memory.
+    pub work: &'a mut Work,
+    /// Who helps.
+    pub team: &'a Team,
+}
+
 /// Working memory of a sub-step.
 #[derive(Debug, Default)]
 pub struct Work {
@@ -67,41 +83,33 @@ impl Work {
     }
 }
 
-/// Advances an island by `h`, with the part `before` of the drift before the kick: a half for the symplectic second
-/// order, none for the force at the pose of the beginning. With `fresh`, all contact surfaces are integrated anew.
-#[expect(clippy::too_many_arguments, reason = "a sub-step touches the whole state of an island")]
-pub fn advance(
-    motions: &mut [Motion],
-    island: &Island,
-    candidates: &mut [Candidate],
-    h: f64,
-    before: f64,
-    settings: &Settings,
-    fresh: bool,
-    work: &mut Work,
-    team: &Team,
-) {
-    drift(motions, island, before * h);
-    let mut clock = Clock::start(work.timed);
-    work.look(motions, island, candidates, settings, fresh, team);
-    clock.lap(&mut work.contact_time);
-    for index in &island.candidates {
-        let candidate = &mut candidates[*index as usize];
-        if candidate.material.static_friction > 0.0 {
-            bend_bristles(candidate, motions, h, &mut work.carriers);
+impl Step<'_> {
+    /// Advances by `h`, with the part `before` of the drift before the kick: a half for the symplectic second order, none
+    /// for the force at the pose of the beginning. With `fresh`, all contact surfaces are integrated anew.
+    pub fn advance(&mut self, h: f64, before: f64, fresh: bool) {
+        let Self { motions, island, candidates, settings, work, team } = self;
+        drift(motions, island, before * h);
+        let mut clock = Clock::start(work.timed);
+        work.look(motions, island, candidates, settings, fresh, team);
+        clock.lap(&mut work.contact_time);
+        for index in &island.candidates {
+            let candidate = &mut candidates[*index as usize];
+            if candidate.material.static_friction > 0.0 {
+                bend_bristles(candidate, motions, h, &mut work.carriers);
+            }
         }
+        for link in &island.links {
+            motions[*link as usize].kick(h);
+        }
+        springs::kick(&island.springs, motions, h);
+        work.grips.clear();
+        for index in &island.candidates {
+            press_candidate(&mut candidates[*index as usize], *index as usize, motions, h, work);
+        }
+        rub(candidates, motions, h, work);
+        drift(motions, island, (1.0 - before) * h);
+        clock.lap(&mut work.solve_time);
     }
-    for link in &island.links {
-        motions[*link as usize].kick(h);
-    }
-    springs::kick(&island.springs, motions, h);
-    work.grips.clear();
-    for index in &island.candidates {
-        press_candidate(&mut candidates[*index as usize], *index as usize, motions, h, work);
-    }
-    rub(candidates, motions, h, work);
-    drift(motions, island, (1.0 - before) * h);
-    clock.lap(&mut work.solve_time);
 }
 
 pub(super) fn drift(motions: &mut [Motion], island: &Island, h: f64) {

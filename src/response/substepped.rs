@@ -4,16 +4,14 @@
 //! mobility of its two bodies there; the rates of all contacts of a link add up. Sub-steps keep `w h` below the world's
 //! `substep_phase`, do not move a body by more than a part of its coat, and never get coarser while a contact lasts.
 
-use super::substep::{Island, Work, advance};
 use super::springs;
+use super::substep::{Island, Step};
 use crate::base::Motion;
 use crate::contact::candidate::Candidate;
 use crate::contact::deepest::{self, Approach};
 use crate::contact::pair::{Pair, Side};
 use crate::contact::stiffness::reachable;
-use crate::contact::surface::Settings;
 use crate::math::Vec3;
-use crate::team::Team;
 
 /// Most of the thinner coat that two bodies may approach in one sub-step.
 const TRAVEL: f64 = 0.25;
@@ -62,22 +60,11 @@ pub fn plan(
 }
 
 /// Advances an island by `dt` in the sub-steps that [`plan`] wants, as far as the limits let it. Gives their number.
-#[expect(clippy::too_many_arguments, reason = "an island's step touches the whole state")]
-pub fn step(
-    motions: &mut [Motion],
-    island: &Island,
-    candidates: &mut [Candidate],
-    dt: f64,
-    settings: &Settings,
-    limits: &Limits,
-    wanted: f64,
-    work: &mut Work,
-    team: &Team,
-) -> u32 {
+pub fn step(step: &mut Step, dt: f64, limits: &Limits, wanted: f64) -> u32 {
     let substeps = wanted.min(f64::from(limits.most)) as u32;
     let h = dt / f64::from(substeps);
     for index in 0..substeps {
-        advance(motions, island, candidates, h, 0.5, settings, index == 0, work, team);
+        step.advance(h, 0.5, index == 0);
     }
     substeps
 }

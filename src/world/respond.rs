@@ -10,13 +10,16 @@ use crate::contact::candidate::Candidate;
 use crate::contact::surface;
 use crate::contact::tally::Tally;
 use crate::math::Wrench;
-use crate::response::substep::{Island, Work};
+use crate::response::substep::{Island, Step, Work};
 use crate::response::{Response, explicit, implicit, substepped};
 use crate::team::Team;
 
 /// Steps for which a body that was in a stack counts as in one still: a stack that rattles should not fall between two
 /// responses.
 const STACKED: u8 = 10;
+
+/// Turn of a spring's swing in a step from which on it is stiff \[rad\].
+const STIFF: f64 = 0.3;
 
 /// Candidates from which on an island is stepped by all workers, and not by one of them beside other islands.
 const WIDE: usize = 24;
@@ -49,40 +52,40 @@ impl Rules {
         solver: &mut implicit::Solver,
         team: &Team,
     ) {
-        let Self { dt, settings, limits, effort } = self;
-        let island = &group.island;
-        group.driven.clear();
+        let dt = self.dt;
+        let Group { island, response, substeps, supports, driven, carried, outcome, .. } = group;
+        driven.clear();
         for link in &island.links {
             let motion = &motions[*link as usize];
             if !motion.is_movable() {
-                group.driven.push((*link, (motion.center, motion.rotation)));
+                driven.push((*link, (motion.center, motion.rotation)));
             }
         }
         // What leans on it elsewhere is added up in the order of the islands, whoever steps them.
-        for link in &group.supports {
+        for link in supports.iter() {
             motions[*link as usize].contact_impulse = Wrench::default();
         }
-        group.outcome = match group.response {
+        let mut step = Step { motions, island, candidates, settings: &self.settings, work, team };
+        *outcome = match response {
             Response::Explicit => {
-                explicit::step(motions, island, candidates, *dt, settings, work, team);
+                explicit::step(&mut step, dt);
                 Outcome { substeps: 1, ..Outcome::default() }
             }
             Response::Implicit => {
-                implicit::step(motions, island, candidates, *dt, settings, effort, solver, work, team);
+                implicit::step(&mut step, dt, &self.effort, solver);
                 Outcome { rounds: solver.rounds, splits: solver.splits, ..Outcome::default() }
             }
             Response::Auto | Response::Substepped => {
-                let wanted = group.substeps;
-                let substeps = substepped::step(motions, island, candidates, *dt, settings, limits, wanted, work, team);
+                let substeps = substepped::step(&mut step, dt, &self.limits, *substeps);
                 Outcome { substeps, ..Outcome::default() }
             }
         };
         // Links that the host moves whatever happens start every island from the host's pose.
-        for (link, pose) in group.driven.iter() {
+        for (link, pose) in driven.iter() {
             (motions[*link as usize].center, motions[*link as usize].rotation) = *pose;
         }
-        group.carried.clear();
-        group.carried.extend(group.supports.iter().map(|link| motions[*link as usize].contact_impulse));
+        carried.clear();
+        carried.extend(supports.iter().map(|link| motions[*link as usize].contact_impulse));
     }
 }
 
@@ -167,7 +170,7 @@ impl World {
         state.responses.resize(self.links.capacity(), Response::Auto);
         self.notice_stacks(state);
         for index in 0..state.island_count {
-            let (mut response, forced) = self.choose(&state.islands[index].island, state);
+            let (mut response, forced) = self.choose(&state.islands[index].island, state, dt);
             if response == Response::Substepped {
                 let (island, rates) = (&state.islands[index].island, &mut state.rates);
                 let wanted = substepped::plan(&state.motions, island, &mut state.candidates, dt, &rules.limits, rates);
@@ -267,9 +270,9 @@ impl World {
     }
 
     /// The response of an island. What a body or the world forces holds for all that it touches, the most stable first;
-    /// left to itself, implicit is for what is jointed, held by its host, or stacked, and sub-steps for the rest. Also
-    /// whether it is forced.
-    fn choose(&self, island: &Island, state: &Stepping) -> (Response, bool) {
+    /// left to itself, implicit is for what is jointed, held by its host, stacked, or on stiff springs, and sub-steps for
+    /// the rest. Also whether it is forced.
+    fn choose(&self, island: &Island, state: &Stepping, dt: f64) -> (Response, bool) {
         let movable = |link: &&u32| state.motions[**link as usize].is_movable();
         let links = || island.links.iter().filter(movable).map(|link| &self.links[*link as usize]);
         let forced = |response| {
@@ -287,7 +290,8 @@ impl World {
             let host = link.desc.kind == Kind::Host && (link.desc.constrained || link.mirror.is_doubtful());
             host || self.bodies[link.body as usize].stacked > 0
         });
-        let implicit = held && !island.candidates.is_empty();
+        let stiff = island.springs.iter().any(|spring| spring.rate2(&state.motions).sqrt() * dt > STIFF);
+        let implicit = held && !island.candidates.is_empty() || stiff;
         (if implicit { Response::Implicit } else { Response::Substepped }, false)
     }
 

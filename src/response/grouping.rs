@@ -1,0 +1,220 @@
+//! From contact surfaces to groups: what each candidate brings into the system of an
+//! [implicit step](super::implicit), as points that press and rub on the links that carry them.
+
+use super::coupled::{Coupled, Grip, Group, Member, Point};
+use super::substep::PUSH_OUT;
+use crate::base::{Inertia, Motion};
+use crate::contact::candidate::Candidate;
+use crate::contact::deepest::{self, Approach};
+use crate::contact::pair::Pair;
+use crate::contact::patch::{self, Node, Patch, Sums};
+use crate::contact::press::{Carriers, Material, friction_radius};
+use crate::contact::stiffness::reachable;
+use crate::math::{Twist, Vec3};
+
+/// Slip velocity up to which friction grows, in thicknesses of the thinner coat a second.
+pub const CREEP: f64 = 0.01;
+
+/// Part of a bristle's bend that is taken back in one step.
+pub const RECOVERY: f64 = 0.2;
+
+/// Stiffness of a wall, over what would take up a mass within a step.
+const WALL: f64 = 1e3;
+
+/// A candidate whose groups are added to a system.
+pub struct Grouping<'a> {
+    /// The system.
+    pub coupled: &'a mut Coupled,
+    /// Working memory.
+    pub carriers: &'a mut Carriers,
+    /// The links where the surface was evaluated.
+    pub trial: &'a [Motion],
+    /// The candidate.
+    pub candidate: &'a Candidate,
+    /// Its position.
+    pub index: u32,
+    /// Length of the step \[s\].
+    pub h: f64,
+    /// The surface is frozen where it is.
+    pub last_resort: bool,
+}
+
+impl Grouping<'_> {
+    /// Adds the groups of the candidate's contact surface, and of what is not in touch yet.
+    pub fn add_all(&mut self) {
+        let Candidate { pair, surface, .. } = self.candidate;
+        let h = self.h;
+        let single = pair.a.only_link().is_some() && pair.b.only_link().is_some();
+        for (number, patch) in surface.patches.iter().enumerate() {
+            let nodes = &surface.nodes[patch.nodes.0..patch.nodes.1];
+            let sums = patch::sum(nodes);
+            if sums.force == Vec3::zeros() {
+                continue;
+            }
+            let grip = self.grip(patch, &sums, nodes);
+            let members = single.then(|| self.members(&sums.center));
+            let first = self.coupled.points.len();
+            for node in nodes {
+                let load = node.force.norm();
+                if load <= 0.0 {
+                    continue;
+                }
+                let begin = self.coupled.points.len();
+                let center = if single { sums.center } else { node.position };
+                self.coupled.points.push(Point {
+                    arm: node.position - center,
+                    normal: node.force / load,
+                    load,
+                    stiffness: node.stiffness,
+                    area: node.area,
+                });
+                if !single {
+                    let members = self.members(&node.position);
+                    let mut grip = grip;
+                    grip.slip += grip.spin.cross(&(node.position - sums.center));
+                    self.add_group(Some(number), center, (begin, begin + 1), members, grip);
+                }
+            }
+            if let Some(members) = members {
+                let points = (first, self.coupled.points.len());
+                self.add_group(Some(number), sums.center, points, members, grip);
+            }
+        }
+        // What must come apart, from where the step began.
+        for (i, j, approach) in &surface.overloads {
+            self.carriers.find(pair, &approach.meeting);
+            let come = self.closing(approach) * h;
+            self.add_wall([*i, *j], approach, -PUSH_OUT * thinner(pair, *i, *j) * h - come);
+        }
+        if !surface.overloads.is_empty() {
+            return;
+        }
+        for (i, j) in combinations(pair) {
+            let approach = deepest::approach(pair, i, j);
+            let gap = approach.distance - thicknesses(pair, i, j);
+            if self.last_resort {
+                // Nothing comes deeper than a coat bears, whatever its speed.
+                self.add_wall([i, j], &approach, (gap + 0.5 * thinner(pair, i, j)).max(0.0));
+            } else if surface.patches.is_empty() {
+                // A gap that may close, so that the next round starts from a shallow touch; one without depth has no
+                // patch yet.
+                self.add_gap([i, j], &approach, gap.max(0.0));
+            }
+        }
+    }
+
+    /// Dry friction of a patch.
+    fn grip(&self, patch: &Patch, sums: &Sums, nodes: &[Node]) -> Grip {
+        let Candidate { pair, material, memory, .. } = self.candidate;
+        if material.friction <= 0.0 && material.static_friction <= 0.0 {
+            return Grip::default();
+        }
+        let [i, j] = patch.skeletons;
+        let thickness = thinner(pair, i, j);
+        let key = [pair.a.ids[i], pair.b.ids[j]];
+        let mut grip = Grip {
+            coefficient: material.friction,
+            creep: CREEP * thickness,
+            radius: if nodes.len() == 1 { friction_radius(nodes, sums) } else { 0.0 },
+            ..Grip::default()
+        };
+        if material.static_friction > 0.0 {
+            let bristle = memory.bristles.iter().find(|bristle| bristle.key == key);
+            if bristle.is_none_or(|bristle| !bristle.sliding) {
+                grip.coefficient = material.static_friction;
+            }
+            if let Some(bristle) = bristle {
+                grip.slip = bristle.slip * (-RECOVERY / self.h);
+                grip.spin = sums.force.normalize() * (bristle.turn * (-RECOVERY / self.h));
+            }
+        }
+        grip
+    }
+
+    /// The links that carry a point; gives their range.
+    fn members(&mut self, position: &Vec3) -> (usize, usize) {
+        let pair = &self.candidate.pair;
+        let first = self.coupled.members.len();
+        self.carriers.find(pair, position);
+        for (shares, sign) in [(&self.carriers.a, -1.0), (&self.carriers.b, 1.0)] {
+            for share in shares {
+                let motion = &self.trial[share.link as usize];
+                self.coupled.members.push(Member {
+                    link: share.link,
+                    weight: sign * share.weight,
+                    arm: position - (motion.center - pair.origin),
+                    turns: !matches!(motion.inertia, Inertia::Point { .. }),
+                });
+            }
+        }
+        (first, self.coupled.members.len())
+    }
+
+    fn add_group(
+        &mut self,
+        patch: Option<usize>,
+        center: Vec3,
+        points: (usize, usize),
+        members: (usize, usize),
+        grip: Grip,
+    ) {
+        self.coupled.groups.push(Group {
+            candidate: self.index,
+            patch: patch.map(|patch| patch as u32),
+            center,
+            points,
+            members,
+            material: if patch.is_some() { self.candidate.material } else { Material::default() },
+            grip,
+            base: Twist::default(),
+        });
+    }
+
+    /// A gap that pushes once the velocities close it, as softly as a shallow contact would.
+    fn add_gap(&mut self, [i, j]: [usize; 2], approach: &Approach, gap: f64) {
+        let pair = &self.candidate.pair;
+        let stiffness = reachable(pair, i, j, 0.1 * thinner(pair, i, j)).stiffness;
+        self.add_lone(approach, -stiffness * gap, stiffness);
+    }
+
+    /// A wall beyond which two skeletons come no closer than `room` metres from where they are; negative room parts them.
+    fn add_wall(&mut self, [i, j]: [usize; 2], approach: &Approach, room: f64) {
+        let pair = &self.candidate.pair;
+        self.carriers.find(pair, &approach.meeting);
+        let mobility = self.carriers.mobility(self.trial, &pair.origin, &approach.meeting);
+        let along = approach.direction.dot(&(mobility * approach.direction));
+        if along > 0.0 {
+            let stiffness = (WALL / (along * self.h * self.h)).max(reachable(pair, i, j, f64::INFINITY).stiffness);
+            self.add_lone(approach, -stiffness * room, stiffness);
+        }
+    }
+
+    /// How fast b comes towards a where two skeletons are closest, at the trial's velocities.
+    fn closing(&self, approach: &Approach) -> f64 {
+        let origin = &self.candidate.pair.origin;
+        -self.carriers.slip(self.trial, origin, &approach.meeting).dot(&approach.direction)
+    }
+
+    fn add_lone(&mut self, approach: &Approach, load: f64, stiffness: f64) {
+        let first = self.coupled.points.len();
+        self.coupled.points.push(Point { arm: Vec3::zeros(), normal: approach.direction, load, stiffness, area: 0.0 });
+        let members = self.members(&approach.meeting);
+        self.add_group(None, approach.meeting, (first, first + 1), members, Grip::default());
+    }
+}
+
+/// All pairs of skeletons of a pair.
+pub fn combinations(pair: &Pair) -> impl Iterator<Item = (usize, usize)> + use<> {
+    let (a, b) = (pair.a.skeletons.len(), pair.b.skeletons.len());
+    (0..a).flat_map(move |i| (0..b).map(move |j| (i, j)))
+}
+
+/// Thickness of the thinner of two coats.
+pub fn thinner(pair: &Pair, i: usize, j: usize) -> f64 {
+    pair.a.skeletons[i].profile.thickness.min(pair.b.skeletons[j].profile.thickness)
+}
+
+/// How far apart two skeletons are whose coats just touch.
+pub fn thicknesses(pair: &Pair, i: usize, j: usize) -> f64 {
+    pair.a.skeletons[i].profile.thickness + pair.b.skeletons[j].profile.thickness
+}
