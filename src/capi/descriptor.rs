@@ -104,7 +104,9 @@ pub(super) unsafe fn read_row<T: Descriptor>(first: *const T, count: usize, name
         // SAFETY: within the row.
         let own = unsafe { size_at(at, name) }.map_err(|refusal| refusal.at(name, index))?;
         if own != size {
-            return Err(Refusal::argument(format!("{name}[{index}].struct_size is {own}; must be {size}, as the first's")));
+            return Err(Refusal::argument(format!(
+                "{name}[{index}].struct_size is {own}; must be {size}, as the first's"
+            )));
         }
         // SAFETY: likewise, and of its size.
         row.push(unsafe { read(at, name) }.map_err(|refusal| refusal.at(name, index))?);

@@ -194,6 +194,9 @@ const FLAT: f64 = 0.2;
 /// Residual over the kinetic energy at work, both squared, that counts as solved.
 const SOLVED: f64 = 1e-18;
 
+/// The same with springs: what the residual leaves is a velocity, which stretches a stiff one.
+const SOLVED_TIES: f64 = 1e-26;
+
 /// Products of a factor beyond which conjugate gradients are quicker.
 const WIDE: usize = 100_000;
 
@@ -269,13 +272,14 @@ impl Coupled {
         self.assemble(x, free, fixed, h, true, team);
         let mut norm = self.norm(&self.residual);
         let scale = norm + self.energy(x) + self.energy(free);
+        let solved = if self.ties.is_empty() { SOLVED } else { SOLVED_TIES };
         for _ in 0..MOST_STEPS {
-            if norm <= SOLVED * scale {
+            if norm <= solved * scale {
                 return true;
             }
             self.step.clone_from(&self.residual);
             // As exactly as it takes to be done after this step, or as a step of Newton's method can use.
-            let enough = (0.3 * (SOLVED * scale / norm).sqrt()).clamp(GRADIENTS.0, GRADIENTS.1);
+            let enough = (0.3 * (solved * scale / norm).sqrt()).clamp(GRADIENTS.0, GRADIENTS.1);
             if !self.solve_step(enough, team) {
                 return false;
             }

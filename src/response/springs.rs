@@ -5,23 +5,33 @@ use crate::base::springs::{Law, Line, Spring, direction};
 use crate::base::{Inertia, Motion};
 use crate::math::{Mat3, Vec3, Wrench};
 
-/// Gives the links the impulses of their springs over `h` seconds, one spring after the other: elastic forces depend on
-/// the poses only, and each damper sees what those before it have left, which keeps any number of them stable.
+/// Gives the links the impulses of their springs over `h` seconds, without damping.
 pub fn kick(springs: &[Spring], motions: &mut [Motion], h: f64) {
     for spring in springs {
+        let line = spring.line(motions);
+        let pull = spring.law.tension(line.length() - spring.law.rest_length, 0.0) * h;
+        push(spring, &line, pull, motions);
+    }
+}
+
+/// Damps springs for `h` seconds, one after the other: each sees what those before it have left, which keeps any number
+/// of them stable. Half before everything else that acts in a sub-step and half after it, in opposite orders, it is of
+/// second order, and no obstacle to rest.
+pub fn damp<'a>(springs: impl Iterator<Item = &'a Spring>, motions: &mut [Motion], h: f64) {
+    for spring in springs.filter(|spring| spring.law.damping > 0.0) {
         let line = spring.line(motions);
         let Some(direction) = line.direction() else { continue };
         let [a, b] = spring.links.map(|link| &motions[link as usize]);
         let mobility = a.mobility(&line.arms[0], &direction) + b.mobility(&line.arms[1], &direction);
-        let (stretch, rate) = (line.length() - spring.law.rest_length, direction.dot(&line.velocity));
-        push(spring, &line, &(direction * spring.law.impulse(stretch, rate, mobility, h)), motions);
+        push(spring, &line, spring.law.damping_impulse(line.rate(), mobility, h), motions);
     }
 }
 
-/// Gives the second link an impulse at its end of the spring, and the first its opposite.
-fn push(spring: &Spring, line: &Line, impulse: &Vec3, motions: &mut [Motion]) {
-    for ((link, arm), impulse) in spring.links.into_iter().zip(&line.arms).zip([-impulse, *impulse]) {
-        motions[link as usize].push(&Wrench { force: impulse, torque: arm.cross(&impulse) });
+/// Pulls on both ends of a spring, with an impulse.
+fn push(spring: &Spring, line: &Line, pull: f64, motions: &mut [Motion]) {
+    let Some(direction) = line.direction() else { return };
+    for ((link, arm), force) in spring.links.into_iter().zip(&line.arms).zip([direction * pull, direction * -pull]) {
+        motions[link as usize].push(&Wrench { force, torque: arm.cross(&force) });
     }
 }
 

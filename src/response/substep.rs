@@ -98,6 +98,7 @@ impl Step<'_> {
                 bend_bristles(candidate, motions, h, &mut work.carriers);
             }
         }
+        springs::damp(island.springs.iter(), motions, 0.5 * h);
         for link in &island.links {
             motions[*link as usize].kick(h);
         }
@@ -107,6 +108,7 @@ impl Step<'_> {
             press_candidate(&mut candidates[*index as usize], *index as usize, motions, h, work);
         }
         rub(candidates, motions, h, work);
+        springs::damp(island.springs.iter().rev(), motions, 0.5 * h);
         drift(motions, island, (1.0 - before) * h);
         clock.lap(&mut work.solve_time);
     }

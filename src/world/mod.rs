@@ -18,8 +18,8 @@ mod units;
 
 use crate::handle::{Arena, Noun, WorldTag};
 pub use desc::{
-    BodyDesc, BodyId, LinkDesc, LinkId, Response, Scheme, SkeletonDesc, SkeletonId, SpringDesc, SpringId, StiffnessRule,
-    VelocityConvention, WorldDesc,
+    BodyDesc, BodyId, LinkDesc, LinkId, Response, Scheme, SkeletonDesc, SkeletonId, SpringDesc, SpringId,
+    StiffnessRule, VelocityConvention, WorldDesc,
 };
 pub use events::{Contact, Counters, Event, EventKind, LogLevel, Tally, Times};
 pub use springs::{Spring, SpringState};
