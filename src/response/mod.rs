@@ -14,8 +14,8 @@ pub mod substepped;
 /// How contact forces act on the links in time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Response {
-    /// The library chooses for each island: [`Response::Implicit`] for what is constrained, held by its host or
-    /// stacked, [`Response::Substepped`] for the rest.
+    /// The library chooses for each island: [`Response::Implicit`] for what is constrained, held by its host, stacked,
+    /// or on stiff springs, [`Response::Substepped`] for the rest.
     #[default]
     Auto,
     /// One force evaluation a step, at the pose of its beginning.
