@@ -254,7 +254,7 @@ typedef uint32_t isocoat_response;
 
 /**
  * The library chooses for each group of bodies in contact: ISOCOAT_RESPONSE_IMPLICIT for what is constrained, held by
- * its host or stacked, ISOCOAT_RESPONSE_SUBSTEPPED for the rest.
+ * its host, stacked, or on stiff springs, ISOCOAT_RESPONSE_SUBSTEPPED for the rest.
  */
 #define ISOCOAT_RESPONSE_AUTO 0u
 /** One evaluation of the forces a step, at its beginning: for small steps only. */
