@@ -7,7 +7,7 @@
 use super::springs;
 use super::substep::{Island, Step};
 use crate::base::Motion;
-use crate::contact::candidate::Candidate;
+use crate::contact::candidate::Kept;
 use crate::contact::deepest::{self, Approach};
 use crate::contact::pair::{Pair, Side};
 use crate::contact::stiffness::reachable;
@@ -33,7 +33,7 @@ pub struct Limits {
 pub fn plan(
     motions: &[Motion],
     island: &Island,
-    candidates: &mut [Candidate],
+    candidates: &mut [Kept],
     dt: f64,
     limits: &Limits,
     rates: &mut [f64],

@@ -1,7 +1,11 @@
 //! Gathering: from the nouns of the world to the motions and candidate pairs that the step works on.
 
+use std::borrow::Cow;
+use std::sync::Arc;
+
 use super::{Body, Link, Skeleton, World};
 use crate::base::{Inertia, Kind, Motion};
+use crate::coat::seeds::Ray;
 use crate::contact::broad_phase::Bounds;
 use crate::contact::candidate::Candidate;
 use crate::contact::pair::Side;
@@ -99,8 +103,16 @@ impl World {
             side.links.push(link);
             side.ids.push(index);
             side.reach.push(skeleton.reach);
-            side.rays.push(skeleton.rays(self.desc.seed_count));
+            let rays = skeleton.rays(self.desc.seed_count);
+            let place = side.skeletons.len() - 1;
+            match side.rays.get_mut(place) {
+                // Nobody counts references while nothing changes: workers would wait for each other.
+                Some(old) if Arc::ptr_eq(old, &rays) => {}
+                Some(old) => *old = rays.into_owned(),
+                None => side.rays.push(rays.into_owned()),
+            }
         }
+        side.rays.truncate(side.skeletons.len());
     }
 
     /// The thinnest coat of a link's skeletons.
@@ -113,7 +125,7 @@ impl World {
 impl Skeleton {
     /// The skeleton's rays in its link's frame, made at the first use. None for a plane: its lattice depends on what
     /// lies on it.
-    pub(super) fn rays(&self, default_count: u32) -> std::sync::Arc<[crate::coat::seeds::Ray]> {
+    pub(super) fn rays(&self, default_count: u32) -> Cow<'_, Arc<[Ray]>> {
         let count = if self.desc.seed_count == 0 { default_count } else { self.desc.seed_count };
         let make = || {
             let mut rays = Vec::new();
@@ -123,7 +135,7 @@ impl Skeleton {
             (count, rays.into())
         };
         let (made_for, rays) = self.rays.get_or_init(make);
-        if *made_for == count { rays.clone() } else { make().1 }
+        if *made_for == count { Cow::Borrowed(rays) } else { Cow::Owned(make().1) }
     }
 }
 
