@@ -19,6 +19,7 @@ const SECTIONS: &[(&str, &str)] = &[
     ("link", "Links"),
     ("skeleton", "Skeletons"),
     ("blend", "Blend graphs"),
+    ("spring", "Springs"),
     ("motion", "Motion of one link"),
     ("buffer", "Bulk calls"),
     ("bulk", ""),

@@ -2,8 +2,8 @@
 //!
 //! Mechanism and nouns are apart. Mechanism: [`status`] (codes, messages), [`version`], [`guard`] (panics, locks),
 //! [`mod@pointer`] and [`descriptor`] (memory of the host), [`handle`], [`buffer`]. Nouns: [`world`], [`body`],
-//! [`link`], [`skeleton`], [`blend`], [`math`], and what is done with them: [`motion`], [`bulk`], [`report`],
-//! [`snapshot`], [`query`], [`draw`], [`tasks`], [`volume`].
+//! [`link`], [`skeleton`], [`blend`], [`spring`], [`math`], and what is done with them: [`motion`], [`bulk`],
+//! [`report`], [`snapshot`], [`query`], [`draw`], [`tasks`], [`volume`].
 //!
 //! Nothing here computes: every function checks the host's pointers, translates, calls the public Rust API, and
 //! translates back. The comments are the manual that goes into the header.
@@ -27,6 +27,7 @@ pub mod query;
 pub mod report;
 pub mod skeleton;
 pub mod snapshot;
+pub mod spring;
 pub mod status;
 pub mod tasks;
 pub mod version;

@@ -180,12 +180,20 @@ struct Work<'a, 'b> {
 impl Work<'_, '_> {
     /// Covers the contact with cells of the first grid, from the deepest point outwards. False when they are too many.
     fn spread(&mut self, at: &Deepest) -> bool {
-        self.workspace.vertices.clear();
-        self.workspace.places.clear();
-        self.workspace.cells.clear();
-        self.workspace.pool.clear();
-        self.workspace.visited.clear();
-        self.workspace.queue.clear();
+        let Workspace { vertices, places, cells, pool, visited, queue } = &mut *self.workspace;
+        // Room for twice as many as the last time: what rests asks for no memory, though its counts change a little.
+        vertices.reserve(vertices.len());
+        places.reserve(places.len());
+        cells.reserve(cells.len());
+        pool.reserve(pool.len());
+        visited.reserve(visited.len());
+        queue.reserve(queue.len());
+        vertices.clear();
+        places.clear();
+        cells.clear();
+        pool.clear();
+        visited.clear();
+        queue.clear();
         let (x, y, height) = self.solver.frame.coordinates(&at.position);
         let (i, j) = grid_cell(x, y);
         self.workspace.queue.push((i, j, height));

@@ -47,6 +47,9 @@ pub struct Candidate {
     pub memory: Memory,
 }
 
+/// A candidate where it stays: lists of them are put together anew in each step.
+pub type Kept = Box<Candidate>;
+
 /// A link in the pair's frame.
 #[derive(Clone, Copy, Debug, Default)]
 struct Placement {

@@ -50,7 +50,7 @@ pub struct Side {
 }
 
 impl Side {
-    /// Forgets the skeletons, keeps the memory.
+    /// Forgets the skeletons, keeps the memory; and the rays, which will mostly be the same again.
     pub fn clear(&mut self) {
         self.skeletons.clear();
         self.graph.clear();
@@ -60,7 +60,6 @@ impl Side {
         self.links.clear();
         self.reach.clear();
         self.poses.clear();
-        self.rays.clear();
     }
 
     /// `f - c` and its gradient.

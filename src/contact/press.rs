@@ -61,16 +61,17 @@ fn share(side: &Side, position: &Vec3, out: &mut Vec<Share>) {
             None => out.push(Share { link, weight }),
         }
     });
-    if total == 0.0 {
-        // Beyond all fields it is the nearest coat's.
-        let gap = |skeleton: &Placed| skeleton.shape.closest(position).distance - skeleton.profile.thickness;
-        let nearest = side.skeletons.iter().zip(&side.links).min_by(|a, b| gap(a.0).total_cmp(&gap(b.0)));
-        out.extend(nearest.map(|(_, link)| Share { link: *link, weight: 1.0 }));
+    if total > 0.0 {
+        for share in out.iter_mut() {
+            share.weight /= total;
+        }
         return;
     }
-    for share in out.iter_mut() {
-        share.weight /= total;
-    }
+    // Where no field reaches, as in the middle of a gap, the closest skeleton's link carries what is there.
+    let distance = |skeleton: &Placed| skeleton.shape.closest(position).distance;
+    let closest = side.skeletons.iter().zip(&side.links).min_by(|a, b| distance(a.0).total_cmp(&distance(b.0)));
+    out.clear();
+    out.extend(closest.map(|(_, link)| Share { link: *link, weight: 1.0 }));
 }
 
 impl Carriers {

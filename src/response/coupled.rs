@@ -10,6 +10,8 @@ use nalgebra::{Matrix6, Vector6};
 
 use super::conjugate::Blocks;
 use super::envelope::{BLOCK, Envelope};
+use super::grouping::Bundle;
+use super::springs::Tie;
 use crate::base::{Inertia, Motion};
 use crate::contact::press::Material;
 use crate::math::{Mat3, Quat, Twist, Vec3, Wrench, rotate_tensor};
@@ -59,42 +61,66 @@ impl Member {
         Wrench { force: about_center.force, torque }
     }
 
-    /// Rows of a slope about the group's centre, as rows about the link's: [`wrench`](Self::wrench) of each column.
-    fn back(&self, slope: &Slope) -> Slope {
-        if !self.turns {
-            return Slope { al: Mat3::zeros(), aa: Mat3::zeros(), ..*slope };
+    /// What a wrench that follows a twist by `slope`, both about the group's centre, is to this link when `other` moves:
+    /// [`wrench`](Self::wrench) of each column, by [`twist`](Self::twist) of each row.
+    fn block(&self, slope: &Slope, other: &Member) -> Matrix6<f64> {
+        let Slope { ll, mut la, mut aa } = *slope;
+        let mut al = la.transpose();
+        if other.turns {
+            la -= times_cross(&ll, &other.arm);
+            aa -= times_cross(&al, &other.arm);
+        } else {
+            (la, aa) = (Mat3::zeros(), Mat3::zeros());
         }
-        let cross = self.arm.cross_matrix();
-        Slope { al: slope.al + cross * slope.ll, aa: slope.aa + cross * slope.la, ..*slope }
-    }
-
-    /// Columns of a slope about the group's centre, as columns for the link's velocities: [`twist`](Self::twist) of each
-    /// row.
-    fn forth(&self, slope: &Slope) -> Slope {
-        if !self.turns {
-            return Slope { la: Mat3::zeros(), aa: Mat3::zeros(), ..*slope };
+        if self.turns {
+            al += cross_times(&self.arm, &ll);
+            aa += cross_times(&self.arm, &la);
+        } else {
+            (al, aa) = (Mat3::zeros(), Mat3::zeros());
         }
-        let cross = self.arm.cross_matrix();
-        Slope { la: slope.la - slope.ll * cross, aa: slope.aa - slope.al * cross, ..*slope }
+        let mut matrix = Matrix6::zeros();
+        for (row, column, block) in [(0, 0, ll), (0, 3, la), (3, 0, al), (3, 3, aa)] {
+            matrix.fixed_view_mut::<3, 3>(row, column).copy_from(&(block * (self.weight * other.weight)));
+        }
+        matrix
     }
 }
 
-/// A matrix from velocities to wrenches, in four blocks: force and torque by linear and angular velocity.
+/// `[arm] matrix`: the cross product with each column.
+fn cross_times(arm: &Vec3, matrix: &Mat3) -> Mat3 {
+    Mat3::from_columns(&[0, 1, 2].map(|column| arm.cross(&matrix.column(column))))
+}
+
+/// `matrix [arm]`.
+fn times_cross(matrix: &Mat3, arm: &Vec3) -> Mat3 {
+    -cross_times(arm, &matrix.transpose()).transpose()
+}
+
+/// A symmetric matrix from twists to wrenches about one point, in blocks: force by linear and by angular velocity, torque
+/// by angular velocity. Torque by linear velocity is the transpose of the second.
 #[derive(Clone, Copy, Debug, Default)]
 struct Slope {
     ll: Mat3,
     la: Mat3,
-    al: Mat3,
     aa: Mat3,
 }
 
 impl Slope {
-    fn to_matrix(self, scale: f64) -> Matrix6<f64> {
-        let mut matrix = Matrix6::zeros();
-        for (row, column, block) in [(0, 0, self.ll), (0, 3, self.la), (3, 0, self.al), (3, 3, self.aa)] {
-            matrix.fixed_view_mut::<3, 3>(row, column).copy_from(&(block * scale));
-        }
-        matrix
+    /// Adds what resists motion along `direction` at `arm`: as much force as motion there, `factor` times.
+    fn add_along(&mut self, direction: &Vec3, arm: &Vec3, factor: f64) {
+        let lever = arm.cross(direction);
+        let (scaled, scaled_lever) = (direction * factor, lever * factor);
+        self.ll += direction * scaled.transpose();
+        self.la += direction * scaled_lever.transpose();
+        self.aa += lever * scaled_lever.transpose();
+    }
+
+    /// Adds what resists all motion at `arm`.
+    fn add_all(&mut self, arm: &Vec3, factor: f64) {
+        let moment = arm * factor;
+        self.ll += Mat3::from_diagonal_element(factor);
+        self.la -= moment.cross_matrix();
+        self.aa += Mat3::from_diagonal_element(arm.dot(&moment)) - arm * moment.transpose();
     }
 }
 
@@ -150,7 +176,9 @@ pub struct Coupled {
     pub groups: Vec<Group>,
     /// Points of all groups.
     pub points: Vec<Point>,
-    /// Members of all groups.
+    /// Springs.
+    pub ties: Vec<Tie>,
+    /// Members of all groups, then of all ties.
     pub members: Vec<Member>,
     masses: Vec<Matrix6<f64>>,
     mobilities: Vec<Matrix6<f64>>,
@@ -160,23 +188,44 @@ pub struct Coupled {
     wide: bool,
     matrix: Envelope,
     blocks_of_matrix: Blocks,
+    /// The part of each group, then of each tie, in the system.
     parts: Vec<Part>,
+    /// The members that are each row of blocks, in the order of the parts, and where each row's begin.
+    roles: Vec<Role>,
+    starts: Vec<u32>,
+    /// The blocks off the diagonal, row by row.
+    couplings: Vec<Coupling>,
+    diagonal: Vec<Matrix6<f64>>,
     residual: Vec<f64>,
     base: Vec<f64>,
     step: Vec<f64>,
 }
 
-/// A group's part of the system.
-#[derive(Clone, Debug, Default)]
+/// The part of a group or a tie in the system.
+#[derive(Clone, Copy, Debug, Default)]
 struct Part {
     /// On b, about the group's centre.
-    push: Wrench,
+    push: Push,
     slope: Slope,
-    /// Rows and columns of the matrix: those of two members, and of the second by the first between them.
-    blocks: [Matrix6<f64>; 3],
+    /// The slope is more than nothing.
+    resists: bool,
 }
 
-/// Least groups that a worker takes in one go.
+/// A group or a tie in which a row's link takes part.
+#[derive(Clone, Copy, Debug, Default)]
+struct Role {
+    part: u32,
+    member: u32,
+}
+
+/// How a member of a group or a tie answers to another.
+#[derive(Clone, Copy, Debug)]
+struct Coupling {
+    part: u32,
+    members: [u32; 2],
+}
+
+/// Least parts, rows and blocks that a worker takes in one go.
 const GROUPS: usize = 16;
 
 /// Steps of Newton's method in one solve.
@@ -188,14 +237,21 @@ const MOST_LOOKS: usize = 12;
 /// Slope along a step, over the slope at its start, that counts as lowest.
 const FLAT: f64 = 0.2;
 
-/// Residual over the kinetic energy at work, both squared, that counts as solved.
+/// Residual over the kinetic energy at work, both squared, at which nothing is left to solve.
 const SOLVED: f64 = 1e-18;
+
+/// The same with springs: what the residual leaves is a velocity, which stretches a stiff one.
+const SOLVED_TIES: f64 = 1e-26;
+
+/// Part of its size in the last step to which a residual's square must have fallen for the next step to be made with the
+/// same matrix.
+const QUICK: f64 = 1e-3;
 
 /// Products of a factor beyond which conjugate gradients are quicker.
 const WIDE: usize = 100_000;
 
-/// Least and most that conjugate gradients leave of a Newton step.
-const GRADIENTS: (f64, f64) = (1e-6, 1e-2);
+/// Least and most that conjugate gradients leave of a Newton step. What the matrix lacks leaves about a hundredth.
+const GRADIENTS: (f64, f64) = (5e-3, 5e-2);
 
 /// Most conjugate gradients in one Newton step.
 const MOST_GRADIENTS: usize = 400;
@@ -218,17 +274,40 @@ impl Coupled {
         }
     }
 
-    /// Forgets the groups.
+    /// Forgets groups and ties.
     pub fn clear(&mut self) {
         self.groups.clear();
         self.points.clear();
+        self.ties.clear();
         self.members.clear();
     }
 
-    /// Velocity of b's flesh relative to a's over a group, about its centre, for velocities `of` the links.
-    pub fn relative(&self, group: &Group, of: impl Fn(u32) -> Twist) -> Twist {
+    /// Adds the groups of a bundle.
+    pub fn append(&mut self, bundle: &Bundle) {
+        let (points, members) = (self.points.len(), self.members.len());
+        let behind = |range: (usize, usize), first: usize| (range.0 + first, range.1 + first);
+        self.groups.extend(bundle.groups.iter().map(|group| Group {
+            points: behind(group.points, points),
+            members: behind(group.members, members),
+            ..*group
+        }));
+        self.points.extend_from_slice(&bundle.points);
+        self.members.extend_from_slice(&bundle.members);
+    }
+
+    /// Sets the velocities at which the contact surfaces were evaluated.
+    pub fn set_base(&mut self, x: &[f64], fixed: &[Motion], team: &Team) {
+        let mut groups = std::mem::take(&mut self.groups);
+        let block = team.share(groups.len(), GROUPS);
+        team.each_mut(&mut groups, block, |_, group| group.base = self.relative_of(group.members, x, fixed));
+        self.groups = groups;
+    }
+
+    /// Velocity of b relative to a over the members of a group, about its centre, or of a tie, for velocities `of` the
+    /// links.
+    pub fn relative(&self, members: (usize, usize), of: impl Fn(u32) -> Twist) -> Twist {
         let mut sum = Twist::default();
-        for member in &self.members[group.members.0..group.members.1] {
+        for member in &self.members[members.0..members.1] {
             let twist = member.twist(&of(member.link));
             sum.linear += twist.linear * member.weight;
             sum.angular += twist.angular * member.weight;
@@ -236,17 +315,22 @@ impl Coupled {
         sum
     }
 
-    /// The relative velocity of a group for the unknowns `x`; `fixed` has the velocities of links without unknowns.
-    pub fn relative_of(&self, group: &Group, x: &[f64], fixed: &[Motion]) -> Twist {
-        self.relative(group, |link| match self.blocks[link as usize] {
+    /// The relative velocity over some members for the unknowns `x`; `fixed` has the velocities of links without unknowns.
+    pub fn relative_of(&self, members: (usize, usize), x: &[f64], fixed: &[Motion]) -> Twist {
+        self.relative(members, |link| match self.blocks[link as usize] {
             NONE => fixed[link as usize].twist,
             block => twist_of(x, block),
         })
     }
 
-    /// What a group comes to at the unknowns `x`.
-    pub fn push(&self, group: &Group, x: &[f64], fixed: &[Motion], h: f64) -> Push {
-        self.respond(group, &self.relative_of(group, x, fixed), h, None)
+    /// The velocities of a link in the unknowns `x`, if it has any.
+    pub fn twist_in(&self, link: u32, x: &[f64]) -> Option<Twist> {
+        Some(self.blocks[link as usize]).filter(|block| *block != NONE).map(|block| twist_of(x, block))
+    }
+
+    /// What each group came to at the unknowns that [`solve`](Self::solve) found.
+    pub fn pushes(&self) -> impl Iterator<Item = (&Group, &Push)> + Clone {
+        self.groups.iter().zip(self.parts.iter().map(|part| &part.push))
     }
 
     /// Solves for the velocities at the end of the step, in place; `free` has those without contact, `fixed` those of
@@ -254,51 +338,55 @@ impl Coupled {
     ///
     /// But for the pressure's part in friction, the residual is the gradient of a convex function. Newton's method
     /// overshoots its lowest point where a slip comes to rest, so each step goes to the lowest point along it.
-    pub fn solve(&mut self, x: &mut [f64], free: &[f64], fixed: &[Motion], h: f64, team: &Team) -> bool {
-        self.shape(x.len() / BLOCK);
+    ///
+    /// One step at least is taken, however small the residual: so what lies comes to rest in the course of time. After
+    /// it a residual of `accuracy`, over the momentum at work, will do.
+    pub fn solve(&mut self, x: &mut [f64], free: &[f64], fixed: &[Motion], h: f64, accuracy: f64, team: &Team) -> bool {
+        self.shape();
         self.assemble(x, free, fixed, h, true, team);
         let mut norm = self.norm(&self.residual);
         let scale = norm + self.energy(x) + self.energy(free);
+        let (solved, enough) =
+            if self.ties.is_empty() { (SOLVED, accuracy * accuracy) } else { (SOLVED_TIES, SOLVED_TIES) };
+        if norm <= solved * scale {
+            return true;
+        }
+        let enough = enough * scale;
+        let (mut last, mut fresh) = (f64::INFINITY, true);
         for _ in 0..MOST_STEPS {
-            if norm <= SOLVED * scale {
-                return true;
+            if !fresh && norm > QUICK * last {
+                self.assemble(x, free, fixed, h, true, team);
+                fresh = true;
             }
             self.step.clone_from(&self.residual);
-            // As exactly as it takes to be done after this step, or as a step of Newton's method can use.
-            let enough = (0.3 * (SOLVED * scale / norm).sqrt()).clamp(GRADIENTS.0, GRADIENTS.1);
-            if !self.solve_step(enough, team) {
+            let left = (0.3 * (enough / norm).sqrt()).clamp(GRADIENTS.0, GRADIENTS.1);
+            if !self.solve_step(left, fresh, team) {
                 return false;
             }
+            fresh = false;
             self.base.clear();
             self.base.extend_from_slice(x);
-            let last = norm;
+            last = norm;
             self.go_lowest(x, free, fixed, h, team);
             norm = self.norm(&self.residual);
             // Sums of contact forces round off.
-            if norm > 0.9 * last && norm <= 1e-16 * scale {
+            if norm <= enough || norm > 0.9 * last && norm <= 1e-16 * scale {
                 return true;
             }
         }
         norm <= 1e-10 * scale
     }
 
-    fn solve_step(&mut self, enough: f64, team: &Team) -> bool {
+    /// Solves for a step; with the matrix of the last one unless it is `fresh`.
+    fn solve_step(&mut self, left: f64, fresh: bool, team: &Team) -> bool {
         if self.wide {
-            return self.blocks_of_matrix.solve(&mut self.step, enough, MOST_GRADIENTS, team);
+            return self.blocks_of_matrix.solve(&self.diagonal, fresh, &mut self.step, left, MOST_GRADIENTS, team);
         }
-        let definite = self.matrix.factor();
+        let definite = !fresh || self.matrix.factor();
         if definite {
             self.matrix.solve(&mut self.step);
         }
         definite
-    }
-
-    fn add(&mut self, i: usize, j: usize, block: &Matrix6<f64>) {
-        if self.wide {
-            self.blocks_of_matrix.add(i, j, block);
-        } else {
-            self.matrix.add(i, j, block);
-        }
     }
 
     fn put_step(&self, x: &mut [f64], part: f64) {
@@ -307,23 +395,20 @@ impl Coupled {
         }
     }
 
-    /// Takes the step to where the slope along it has fallen to a small part, and assembles the system there.
+    /// Takes the step to where the slope along it has fallen to a small part, with the residual there.
     fn go_lowest(&mut self, x: &mut [f64], free: &[f64], fixed: &[Motion], h: f64, team: &Team) {
         let along = |residual: &[f64], step: &[f64]| -> f64 { residual.iter().zip(step).map(|(r, s)| r * s).sum() };
         let start = along(&self.residual, &self.step);
         let (mut low, mut slope_low) = (0.0, start);
         let (mut high, mut slope_high) = (1.0, 0.0);
         let mut part = 1.0;
-        for look in 0..MOST_LOOKS {
+        for _ in 0..MOST_LOOKS {
             self.put_step(x, part);
-            // Nearly all steps are good as a whole.
-            self.assemble(x, free, fixed, h, look == 0, team);
+            self.assemble(x, free, fixed, h, false, team);
             let slope = along(&self.residual, &self.step);
+            // Nearly all steps are good as a whole.
             if slope.abs() <= FLAT * start || slope >= 0.0 && part == 1.0 {
-                if look == 0 {
-                    return;
-                }
-                break;
+                return;
             }
             if slope > 0.0 {
                 // Keeps the other end from standing still.
@@ -337,7 +422,7 @@ impl Coupled {
             part = part.clamp(low + 0.01 * (high - low), high - 0.01 * (high - low));
         }
         self.put_step(x, part);
-        self.assemble(x, free, fixed, h, true, team);
+        self.assemble(x, free, fixed, h, false, team);
     }
 
     /// Square of a residual's size: the kinetic energy of the velocities that it stands for, twice.
@@ -358,112 +443,134 @@ impl Coupled {
         x.chunks_exact(BLOCK).zip(&self.masses).map(size).sum()
     }
 
-    /// The envelope that the groups need.
-    fn shape(&mut self, count: usize) {
-        self.first.clear();
-        self.first.extend(0..count as u32);
-        for group in &self.groups {
-            let blocks = || {
-                let members = self.members[group.members.0..group.members.1].iter();
-                members.map(|member| self.blocks[member.link as usize]).filter(|block| *block != NONE)
-            };
-            let Some(lowest) = blocks().min() else { continue };
-            for block in blocks() {
-                let first = &mut self.first[block as usize];
-                *first = lowest.min(*first);
+    /// Who is coupled with whom, and the shape of the matrix.
+    fn shape(&mut self) {
+        let Self { groups, ties, members, blocks, roles, starts, couplings, first, .. } = self;
+        let parts = groups.iter().map(|group| group.members).chain(ties.iter().map(|tie| tie.members));
+        let count = self.masses.len();
+        let block = |member: usize| blocks[members[member].link as usize];
+        let taking_part = |(first, end): (usize, usize)| (first..end).filter(|member| block(*member) != NONE);
+        let members_of = |part: usize| match groups.get(part) {
+            Some(group) => group.members,
+            None => ties[part - groups.len()].members,
+        };
+        first.clear();
+        first.extend(0..count as u32);
+        starts.clear();
+        starts.resize(count + 2, 0);
+        for part in parts.clone() {
+            let lowest = taking_part(part).map(block).min().unwrap_or(NONE);
+            for row in taking_part(part).map(block) {
+                first[row as usize] = lowest.min(first[row as usize]);
+                starts[row as usize + 2] += 1;
             }
         }
-        self.wide = Envelope::cost(&self.first) > WIDE;
+        for row in 2..starts.len() {
+            starts[row] += starts[row - 1];
+        }
+        roles.clear();
+        roles.resize(starts[count + 1] as usize, Role::default());
+        for (index, part) in parts.enumerate() {
+            for member in taking_part(part) {
+                // Each row's start, kept one place up meanwhile, moves to the next one's.
+                let place = &mut starts[block(member) as usize + 1];
+                roles[*place as usize] = Role { part: index as u32, member: member as u32 };
+                *place += 1;
+            }
+        }
+        self.wide = Envelope::cost(first) > WIDE;
         if !self.wide {
-            self.matrix.reset(&self.first);
+            self.matrix.reset(first);
+        }
+        let (wide, matrix) = (self.wide, &mut self.blocks_of_matrix);
+        couplings.clear();
+        matrix.clear();
+        for row in 0..count {
+            for role in &roles[starts[row] as usize..starts[row + 1] as usize] {
+                for other in taking_part(members_of(role.part as usize)) {
+                    // Of a factor the lower half.
+                    if block(other) < row as u32 || wide && block(other) > row as u32 {
+                        couplings.push(Coupling { part: role.part, members: [role.member, other as u32] });
+                        matrix.couple(block(other));
+                    }
+                }
+            }
+            matrix.end_row();
         }
     }
 
-    /// Residual `M (x - free) - h Σ forces` and its derivative.
+    /// Residual `M (x - free) - h Σ forces` and its derivative. Each part, then each row and each block is worked out by
+    /// one worker.
     fn assemble(&mut self, x: &[f64], free: &[f64], fixed: &[Motion], h: f64, with_matrix: bool, team: &Team) {
-        if with_matrix && self.wide {
-            self.blocks_of_matrix.reset(self.masses.len());
-        } else if with_matrix {
-            self.matrix.zero();
-        }
-        self.residual.clear();
-        for block in 0..self.masses.len() {
-            let mass = self.masses[block];
-            let range = block * BLOCK..(block + 1) * BLOCK;
-            let change =
-                Vector6::from_column_slice(&x[range.clone()]) - Vector6::from_column_slice(&free[range.clone()]);
-            self.residual.extend_from_slice((mass * change).as_slice());
-            if with_matrix {
-                self.add(block, block, &mass);
-            }
-        }
         let mut parts = std::mem::take(&mut self.parts);
-        parts.resize_with(self.groups.len(), Part::default);
-        let block = team.share(parts.len(), GROUPS);
-        team.each_mut(&mut parts, block, |index, part| {
-            self.work_out(&self.groups[index], x, fixed, h, with_matrix, part);
+        let count = self.groups.len() + self.ties.len();
+        parts.resize(count, Part::default());
+        team.each_mut(&mut parts, team.share(count, GROUPS), |index, part| match self.groups.get(index) {
+            Some(group) => {
+                let relative = self.relative_of(group.members, x, fixed);
+                part.push = self.respond(group, &relative, h, with_matrix.then_some(&mut part.slope));
+                part.resists = part.push.all != Wrench::default();
+            }
+            None => {
+                let tie = &self.ties[index - self.groups.len()];
+                let (force, ll) = tie.respond(&self.relative_of(tie.members, x, fixed).linear, h);
+                part.push.all = Wrench { force, torque: Vec3::zeros() };
+                (part.slope, part.resists) = (Slope { ll, ..Slope::default() }, true);
+            }
         });
-        for (index, part) in parts.iter().enumerate() {
-            if part.push != Wrench::default() {
-                self.put(self.groups[index].members, part, h, with_matrix);
-            }
-        }
         self.parts = parts;
-    }
-
-    /// Works out a group's part of the system.
-    fn work_out(&self, group: &Group, x: &[f64], fixed: &[Motion], h: f64, with_matrix: bool, part: &mut Part) {
-        let relative = self.relative_of(group, x, fixed);
-        part.push = self.respond(group, &relative, h, with_matrix.then_some(&mut part.slope)).all;
-        let (first, end) = group.members;
-        if with_matrix && end - first <= 2 && part.push != Wrench::default() {
-            for row in 0..end - first {
-                for other in 0..=row {
-                    part.blocks[row + other] = self.block(&part.slope, first + row, first + other, h);
-                }
+        let Self { parts, members, masses, roles, starts, couplings, diagonal, residual, .. } = self;
+        let (parts, members, masses, roles) = (&*parts, &*members, &*masses, &*roles);
+        let roles_of = |row: usize| &roles[starts[row] as usize..starts[row + 1] as usize];
+        residual.resize(masses.len() * BLOCK, 0.0);
+        let work_out = |row: usize, residual: &mut [f64]| {
+            let range = row * BLOCK..(row + 1) * BLOCK;
+            let change = Vector6::from_column_slice(&x[range.clone()]) - Vector6::from_column_slice(&free[range]);
+            let mut sum = masses[row] * change;
+            for role in roles_of(row) {
+                let member = &members[role.member as usize];
+                let Wrench { force, torque } = member.wrench(&parts[role.part as usize].push.all);
+                sum -= Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z) * (h * member.weight);
             }
+            residual.copy_from_slice(sum.as_slice());
+        };
+        if !with_matrix {
+            team.each_row(residual, BLOCK, &mut vec![(); masses.len()], work_out);
+            return;
         }
-    }
-
-    /// How a member's rows of the system change with the velocities of another.
-    fn block(&self, slope: &Slope, row: usize, other: usize, h: f64) -> Matrix6<f64> {
-        let (member, other) = (self.members[row], self.members[other]);
-        other.forth(&member.back(slope)).to_matrix(h * member.weight * other.weight)
-    }
-
-    /// Adds a group's part to the system.
-    fn put(&mut self, (first, end): (usize, usize), part: &Part, h: f64, with_matrix: bool) {
-        for row in first..end {
-            let member = self.members[row];
-            let i = self.blocks[member.link as usize];
-            if i == NONE {
-                continue;
-            }
-            let push = member.wrench(&part.push);
-            let residual = &mut self.residual[i as usize * BLOCK..];
-            for axis in 0..3 {
-                residual[axis] -= h * member.weight * push.force[axis];
-                residual[3 + axis] -= h * member.weight * push.torque[axis];
-            }
-            if !with_matrix {
-                continue;
-            }
-            for other in first..=row {
-                let link = self.members[other].link;
-                let j = self.blocks[link as usize];
-                if j == NONE {
-                    continue;
+        diagonal.resize(masses.len(), Matrix6::zeros());
+        team.each_row(residual, BLOCK, diagonal, |row, residual| {
+            work_out(row, residual);
+            let mut sum = masses[row];
+            for role in roles_of(row) {
+                let (part, member) = (&parts[role.part as usize], &members[role.member as usize]);
+                if part.resists {
+                    sum += member.block(&part.slope, member) * h;
                 }
-                let block = if end - first <= 2 {
-                    part.blocks[row + other - 2 * first]
-                } else {
-                    self.block(&part.slope, row, other, h)
-                };
-                if i > j || i == j && link == member.link {
-                    self.add(i as usize, j as usize, &block);
-                } else {
-                    self.add(j as usize, i as usize, &block.transpose());
-                }
+            }
+            sum
+        });
+        let couplings = &*couplings;
+        let block = |index: usize| {
+            let Coupling { part, members: [row, other] } = couplings[index];
+            let part = &parts[part as usize];
+            part.resists.then(|| members[row as usize].block(&part.slope, &members[other as usize]) * h)
+        };
+        if self.wide {
+            let entries = self.blocks_of_matrix.entries();
+            team.each_mut(entries, team.share(couplings.len(), GROUPS), |index, entry| {
+                *entry = block(index).unwrap_or_else(Matrix6::zeros);
+            });
+            return;
+        }
+        self.matrix.zero();
+        for (row, block) in diagonal.iter().enumerate() {
+            self.matrix.add(row, row, block);
+        }
+        for (index, coupling) in couplings.iter().enumerate() {
+            if let Some(block) = block(index) {
+                let [row, other] = coupling.members.map(|member| self.blocks[members[member as usize].link as usize]);
+                self.matrix.add(row as usize, other as usize, &block);
             }
         }
     }
@@ -476,59 +583,46 @@ impl Coupled {
             Twist { linear: relative.linear - group.base.linear, angular: relative.angular - group.base.angular };
         let (mut normal_load, mut mean_normal) = (0.0, Vec3::zeros());
         let mut push = Push::default();
-        // Everything about the centre; the slope as blocks.
-        let (mut ll, mut la, mut aa) = (Mat3::zeros(), Mat3::zeros(), Mat3::zeros());
+        let (mut sum, with_slope) = (Slope::default(), slope.is_some());
         for point in &self.points[group.points.0..group.points.1] {
-            let pressing = point.load - h * point.stiffness * point.normal.dot(&since.at(&point.arm));
+            let Point { arm, normal, .. } = point;
+            let pressing = point.load - h * point.stiffness * normal.dot(&since.at(arm));
             if pressing <= 0.0 {
                 continue;
             }
-            let velocity = relative.at(&point.arm);
-            let parting = point.normal.dot(&velocity);
+            let velocity = relative.at(arm);
+            let parting = normal.dot(&velocity);
             let damping = (1.0 - dissipation * parting).max(0.0);
             let drag = viscous * point.area;
             let load = (pressing * damping - drag * parting).max(0.0);
-            let mut force = point.normal * load - (velocity - point.normal * parting) * drag;
-            push.pressing.add_force_at(&force, &point.arm);
-            let stiff = if load > 0.0 {
+            let mut force = normal * load - (velocity - normal * parting) * drag;
+            push.pressing.add_force_at(&force, arm);
+            // What resists across, along, and less along the slip.
+            let mut across = 0.0;
+            if load > 0.0 {
                 let damped = if damping > 0.0 { pressing * dissipation } else { 0.0 };
-                h * point.stiffness * damping + damped + drag
-            } else {
-                0.0
-            };
-            let mut matrix = None;
-            if drag > 0.0 {
-                let along = point.normal * point.normal.transpose();
-                matrix = Some(Mat3::identity() * drag - along * drag);
+                across = h * point.stiffness * damping + damped + drag;
             }
+            let mut along = drag;
             if grip.coefficient > 0.0 && load > 0.0 {
                 normal_load += load;
-                mean_normal += point.normal * load;
-                let wanted = grip.slip + grip.spin.cross(&point.arm);
+                mean_normal += normal * load;
+                let wanted = grip.slip + grip.spin.cross(arm);
                 let slip = velocity - wanted;
-                let slip = slip - point.normal * slip.dot(&point.normal);
-                let speed = (slip.norm_squared() + grip.creep * grip.creep).sqrt();
-                let most = grip.coefficient * load / speed;
+                let slip = slip - normal * slip.dot(normal);
+                let speed2 = slip.norm_squared() + grip.creep * grip.creep;
+                let most = grip.coefficient * load / speed2.sqrt();
                 force -= slip * most;
-                if slope.is_some() {
-                    let plane = Mat3::identity() - point.normal * point.normal.transpose();
-                    let resists = (plane - slip * slip.transpose() / (speed * speed)) * most;
-                    matrix = Some(matrix.map_or(resists, |drag| drag + resists));
+                if with_slope {
+                    along += most;
+                    sum.add_along(&slip, arm, -most / speed2);
                 }
             }
-            push.all.add_force_at(&force, &point.arm);
-            if slope.is_some() {
-                let lever = point.arm.cross(&point.normal);
-                let stiff_normal = point.normal * stiff;
-                ll += stiff_normal * point.normal.transpose();
-                la += stiff_normal * lever.transpose();
-                aa += lever * lever.transpose() * stiff;
-                if let Some(matrix) = matrix {
-                    // d(force)/d(linear, angular) = matrix (I, -[arm]), and the torque is [arm] times the force.
-                    let cross = point.arm.cross_matrix();
-                    ll += matrix;
-                    la -= matrix * cross;
-                    aa -= cross * matrix * cross;
+            push.all.add_force_at(&force, arm);
+            if with_slope {
+                sum.add_along(normal, arm, across - along);
+                if along > 0.0 {
+                    sum.add_all(arm, along);
                 }
             }
         }
@@ -539,10 +633,10 @@ impl Coupled {
             let rate = (spin * spin + creep * creep).sqrt();
             let most = grip.coefficient * normal_load * grip.radius;
             push.all.torque -= axis * (most * spin / rate);
-            aa += axis * axis.transpose() * (most / rate * (1.0 - (spin / rate).powi(2)));
+            sum.aa += axis * axis.transpose() * (most / rate * (1.0 - (spin / rate).powi(2)));
         }
         if let Some(slope) = slope {
-            *slope = Slope { ll, la, al: la.transpose(), aa };
+            *slope = sum;
         }
         push
     }

@@ -1,7 +1,7 @@
 //! From contact surfaces to groups: what each candidate brings into the system of an
 //! [implicit step](super::implicit), as points that press and rub on the links that carry them.
 
-use super::coupled::{Coupled, Grip, Group, Member, Point};
+use super::coupled::{Grip, Group, Member, Point};
 use super::substep::PUSH_OUT;
 use crate::base::{Inertia, Motion};
 use crate::contact::candidate::Candidate;
@@ -21,12 +21,31 @@ pub const RECOVERY: f64 = 0.2;
 /// Stiffness of a wall, over what would take up a mass within a step.
 const WALL: f64 = 1e3;
 
-/// A candidate whose groups are added to a system.
+/// Groups of some candidates, with their points and members.
+#[derive(Debug, Default)]
+pub struct Bundle {
+    /// The groups; their ranges count from the beginning of the bundle.
+    pub groups: Vec<Group>,
+    /// Points of all groups.
+    pub points: Vec<Point>,
+    /// Members of all groups.
+    pub members: Vec<Member>,
+    carriers: Carriers,
+}
+
+impl Bundle {
+    /// Forgets the groups.
+    pub fn clear(&mut self) {
+        self.groups.clear();
+        self.points.clear();
+        self.members.clear();
+    }
+}
+
+/// A candidate whose groups are put together.
 pub struct Grouping<'a> {
-    /// The system.
-    pub coupled: &'a mut Coupled,
-    /// Working memory.
-    pub carriers: &'a mut Carriers,
+    /// Where they are put.
+    pub bundle: &'a mut Bundle,
     /// The links where the surface was evaluated.
     pub trial: &'a [Motion],
     /// The candidate.
@@ -35,6 +54,8 @@ pub struct Grouping<'a> {
     pub index: u32,
     /// Length of the step \[s\].
     pub h: f64,
+    /// Beyond this distance nothing can come together in this round \[m\].
+    pub reach: f64,
     /// The surface is frozen where it is.
     pub last_resort: bool,
 }
@@ -53,15 +74,15 @@ impl Grouping<'_> {
             }
             let grip = self.grip(patch, &sums, nodes);
             let members = single.then(|| self.members(&sums.center));
-            let first = self.coupled.points.len();
+            let first = self.bundle.points.len();
             for node in nodes {
                 let load = node.force.norm();
                 if load <= 0.0 {
                     continue;
                 }
-                let begin = self.coupled.points.len();
+                let begin = self.bundle.points.len();
                 let center = if single { sums.center } else { node.position };
-                self.coupled.points.push(Point {
+                self.bundle.points.push(Point {
                     arm: node.position - center,
                     normal: node.force / load,
                     load,
@@ -76,13 +97,13 @@ impl Grouping<'_> {
                 }
             }
             if let Some(members) = members {
-                let points = (first, self.coupled.points.len());
+                let points = (first, self.bundle.points.len());
                 self.add_group(Some(number), sums.center, points, members, grip);
             }
         }
         // What must come apart, from where the step began.
         for (i, j, approach) in &surface.overloads {
-            self.carriers.find(pair, &approach.meeting);
+            self.bundle.carriers.find(pair, &approach.meeting);
             let come = self.closing(approach) * h;
             self.add_wall([*i, *j], approach, -PUSH_OUT * thinner(pair, *i, *j) * h - come);
         }
@@ -95,7 +116,7 @@ impl Grouping<'_> {
             if self.last_resort {
                 // Nothing comes deeper than a coat bears, whatever its speed.
                 self.add_wall([i, j], &approach, (gap + 0.5 * thinner(pair, i, j)).max(0.0));
-            } else if surface.patches.is_empty() {
+            } else if surface.patches.is_empty() && gap <= self.reach {
                 // A gap that may close, so that the next round starts from a shallow touch; one without depth has no
                 // patch yet.
                 self.add_gap([i, j], &approach, gap.max(0.0));
@@ -134,12 +155,13 @@ impl Grouping<'_> {
     /// The links that carry a point; gives their range.
     fn members(&mut self, position: &Vec3) -> (usize, usize) {
         let pair = &self.candidate.pair;
-        let first = self.coupled.members.len();
-        self.carriers.find(pair, position);
-        for (shares, sign) in [(&self.carriers.a, -1.0), (&self.carriers.b, 1.0)] {
+        let first = self.bundle.members.len();
+        self.bundle.carriers.find(pair, position);
+        let Bundle { carriers, members, .. } = &mut *self.bundle;
+        for (shares, sign) in [(&carriers.a, -1.0), (&carriers.b, 1.0)] {
             for share in shares {
                 let motion = &self.trial[share.link as usize];
-                self.coupled.members.push(Member {
+                members.push(Member {
                     link: share.link,
                     weight: sign * share.weight,
                     arm: position - (motion.center - pair.origin),
@@ -147,7 +169,7 @@ impl Grouping<'_> {
                 });
             }
         }
-        (first, self.coupled.members.len())
+        (first, self.bundle.members.len())
     }
 
     fn add_group(
@@ -158,7 +180,7 @@ impl Grouping<'_> {
         members: (usize, usize),
         grip: Grip,
     ) {
-        self.coupled.groups.push(Group {
+        self.bundle.groups.push(Group {
             candidate: self.index,
             patch: patch.map(|patch| patch as u32),
             center,
@@ -180,8 +202,8 @@ impl Grouping<'_> {
     /// A wall beyond which two skeletons come no closer than `room` metres from where they are; negative room parts them.
     fn add_wall(&mut self, [i, j]: [usize; 2], approach: &Approach, room: f64) {
         let pair = &self.candidate.pair;
-        self.carriers.find(pair, &approach.meeting);
-        let mobility = self.carriers.mobility(self.trial, &pair.origin, &approach.meeting);
+        self.bundle.carriers.find(pair, &approach.meeting);
+        let mobility = self.bundle.carriers.mobility(self.trial, &pair.origin, &approach.meeting);
         let along = approach.direction.dot(&(mobility * approach.direction));
         if along > 0.0 {
             let stiffness = (WALL / (along * self.h * self.h)).max(reachable(pair, i, j, f64::INFINITY).stiffness);
@@ -192,12 +214,12 @@ impl Grouping<'_> {
     /// How fast b comes towards a where two skeletons are closest, at the trial's velocities.
     fn closing(&self, approach: &Approach) -> f64 {
         let origin = &self.candidate.pair.origin;
-        -self.carriers.slip(self.trial, origin, &approach.meeting).dot(&approach.direction)
+        -self.bundle.carriers.slip(self.trial, origin, &approach.meeting).dot(&approach.direction)
     }
 
     fn add_lone(&mut self, approach: &Approach, load: f64, stiffness: f64) {
-        let first = self.coupled.points.len();
-        self.coupled.points.push(Point { arm: Vec3::zeros(), normal: approach.direction, load, stiffness, area: 0.0 });
+        let first = self.bundle.points.len();
+        self.bundle.points.push(Point { arm: Vec3::zeros(), normal: approach.direction, load, stiffness, area: 0.0 });
         let members = self.members(&approach.meeting);
         self.add_group(None, approach.meeting, (first, first + 1), members, Grip::default());
     }

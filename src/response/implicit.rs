@@ -1,4 +1,4 @@
-//! Implicit response: velocities and contact forces of a whole island that agree at the end of the step.
+//! Implicit response: velocities, contact forces and springs of a whole island that agree at the end of the step.
 //!
 //! Backward Euler with the contact surfaces evaluated at the end pose (docs/model.md, "Implicit response"). The
 //! velocities start as they were, with what would carry bodies into each other taken away; then, in turn, the surfaces
@@ -8,12 +8,14 @@
 
 use super::coupled::{Coupled, Group, Member, Point, Push, put_twist, twist_of};
 use super::envelope::{BLOCK, OrderBuffers, narrow_order};
-use super::grouping::{CREEP, Grouping, RECOVERY, combinations, thicknesses, thinner};
+use super::grouping::{Bundle, CREEP, Grouping, RECOVERY, combinations, thicknesses, thinner};
+use super::springs::{self, Tie};
 use super::substep::{Island, Step, bend_bristles, drift};
 use crate::base::Motion;
 use crate::clock::Clock;
-use crate::contact::candidate::Candidate;
+use crate::contact::candidate::{Candidate, Kept};
 use crate::contact::deepest;
+use crate::contact::pair::Pair;
 use crate::contact::patch::Sums;
 use crate::contact::press::Carriers;
 use crate::math::{Twist, Vec3, Wrench};
@@ -32,6 +34,15 @@ pub struct Effort {
 /// Pairs that a worker places in one go.
 const BLOCK_OF_PAIRS: usize = 16;
 
+/// Candidates whose groups a worker puts together in one go.
+const TOGETHER: usize = 8;
+
+/// Velocity that a round may leave unsolved, over the velocity at work and the motion that it may leave unseen.
+const ACCURACY: f64 = 2e-5;
+
+/// How much faster a link may get in a step than any is before it, or differ from its free motion, by guess.
+const RUSH: f64 = 4.0;
+
 /// Sweeps that take the approach out of the first guess.
 const SWEEPS: usize = 10;
 
@@ -49,12 +60,19 @@ pub struct Solver {
     /// The island's links with unknowns, in the order of the system.
     order: Vec<u32>,
     graph: Graph,
+    bundles: Vec<Bundle>,
     coupled: Coupled,
     free: Vec<f64>,
     x: Vec<f64>,
+    /// Where the surfaces were evaluated.
+    looked: Vec<f64>,
+    nearby: Vec<Nearby>,
     rows: Vec<Row>,
+    /// The longest arm of a contact \[m\].
+    arm: f64,
+    /// How far apart two skeletons are that nothing in the round can bring together \[m\].
+    reach: f64,
     carriers: Carriers,
-    pushes: Vec<Push>,
     /// Rounds of the last step, all halves together.
     pub rounds: u32,
     /// Halvings of the last step.
@@ -70,20 +88,55 @@ struct Graph {
 }
 
 /// A direction in which two skeletons may not come closer than they are apart.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 struct Row {
     links: [u32; 2],
     arms: [Vec3; 2],
     normal: Vec3,
     /// Least velocity of b away from a \[m/s\].
     least: f64,
+    mobility: f64,
     impulse: f64,
+}
+
+impl Row {
+    /// Velocities of both links there.
+    fn velocities(&self, links: &[Motion]) -> [Vec3; 2] {
+        [0, 1].map(|side| links[self.links[side] as usize].twist.at(&self.arms[side]))
+    }
+}
+
+/// Rows of some candidates.
+#[derive(Debug, Default)]
+struct Nearby {
+    rows: Vec<Row>,
+    /// The highest speed at their ends, and their longest arm.
+    fastest: f64,
+    arm: f64,
+}
+
+impl Nearby {
+    fn add(&mut self, pair: &Pair, motions: &[Motion], h: f64) {
+        for (i, j) in combinations(pair) {
+            let approach = deepest::approach(pair, i, j);
+            let links = [pair.a.links[i], pair.b.links[j]];
+            let arms = links.map(|link| approach.meeting - (motions[link as usize].center - pair.origin));
+            let gap = approach.distance - thicknesses(pair, i, j);
+            let (least, mobility, impulse) = (-gap.max(0.0) / h, 0.0, 0.0);
+            let row = Row { links, arms, normal: approach.direction, least, mobility, impulse };
+            for (velocity, arm) in row.velocities(motions).iter().zip(&row.arms) {
+                self.fastest = self.fastest.max(velocity.norm());
+                self.arm = self.arm.max(arm.norm());
+            }
+            self.rows.push(row);
+        }
+    }
 }
 
 /// Advances an island by `dt`.
 pub fn step(step: &mut Step, dt: f64, effort: &Effort, solver: &mut Solver) {
     (solver.rounds, solver.splits) = (0, 0);
-    if step.island.candidates.is_empty() {
+    if step.island.candidates.is_empty() && step.island.springs.is_empty() {
         fly(step.motions, step.island, dt);
         return;
     }
@@ -114,21 +167,26 @@ fn halves(step: &mut Step, dt: f64, effort: &Effort, splits: u32, solver: &mut S
 
 impl Solver {
     /// The links with unknowns, neighbours near each other.
-    fn order_links(&mut self, island: &Island, candidates: &[Candidate], motions: &[Motion]) {
+    fn order_links(&mut self, island: &Island, candidates: &[Kept], motions: &[Motion]) {
         let Graph { nodes, edges, order, buffers } = &mut self.graph;
         nodes.clear();
         nodes.extend(island.links.iter().filter(|link| motions[**link as usize].is_movable()));
         nodes.sort_unstable();
         edges.clear();
+        let place = |link: &u32| nodes.binary_search(link).ok().map(|place| place as u32);
         for index in &island.candidates {
             let pair = &candidates[*index as usize].pair;
-            let place = |link: &u32| nodes.binary_search(link).ok().map(|place| place as u32);
             for a in pair.a.links.iter().filter_map(place) {
                 for b in pair.b.links.iter().filter_map(place) {
                     if a != b {
                         edges.push((a.min(b), a.max(b)));
                     }
                 }
+            }
+        }
+        for [a, b] in island.springs.iter().map(|spring| spring.links) {
+            if let (Some(a), Some(b)) = (place(&a), place(&b)) {
+                edges.push((a.min(b), a.max(b)));
             }
         }
         edges.sort_unstable();
@@ -154,14 +212,22 @@ impl Solver {
         let mut clock = Clock::start(step.work.timed);
         self.first_guess(step, h);
         clock.lap(&mut step.work.solve_time);
+        // Nearly all that contacts can do is to take away what makes the free motion differ.
+        self.reach = RUSH * h * self.change(&self.free);
+        let nobody_near = step.island.candidates.is_empty();
         let mut converged = false;
         for _ in 0..effort.rounds {
             self.rounds += 1;
             self.look(step, h);
             clock.lap(&mut step.work.contact_time);
             self.couple_all(step, h, false);
-            let solved = self.coupled.solve(&mut self.x, &self.free, step.motions, h, step.team);
-            converged = solved && self.agrees(step.motions, step.candidates, h, effort.tolerance);
+            let solved =
+                self.coupled.solve(&mut self.x, &self.free, step.motions, h, ACCURACY * effort.tolerance, step.team);
+            let closed = 2.0 * h * self.change(&self.looked);
+            converged = solved
+                && (closed <= self.reach || nobody_near)
+                && self.agrees(step.motions, step.candidates, h, effort.tolerance);
+            self.reach = self.reach.max(RUSH * closed);
             clock.lap(&mut step.work.solve_time);
             if !solved || converged {
                 break;
@@ -176,7 +242,7 @@ impl Solver {
             self.look(step, h);
             clock.lap(&mut step.work.contact_time);
             self.couple_all(step, h, true);
-            self.coupled.solve(&mut self.x, &self.free, step.motions, h, step.team);
+            self.coupled.solve(&mut self.x, &self.free, step.motions, h, ACCURACY * effort.tolerance, step.team);
         }
         self.commit(step, h);
         clock.lap(&mut step.work.solve_time);
@@ -190,10 +256,10 @@ impl Solver {
         for link in &island.links {
             self.trial[*link as usize] = motions[*link as usize];
         }
-        self.rows.clear();
         team.each_at(candidates, &island.candidates, BLOCK_OF_PAIRS, |candidate| {
             candidate.pair.place(motions, candidate.lead);
         });
+        let candidates = &**candidates;
         for index in &island.candidates {
             let pair = &candidates[*index as usize].pair;
             // Those that move are the island's, and there already.
@@ -202,24 +268,36 @@ impl Solver {
                     self.trial[*link as usize] = motions[*link as usize];
                 }
             }
-            for (i, j) in combinations(pair) {
-                let approach = deepest::approach(pair, i, j);
-                let links = [pair.a.links[i], pair.b.links[j]];
-                let arms = links.map(|link| approach.meeting - (motions[link as usize].center - pair.origin));
-                let gap = approach.distance - thicknesses(pair, i, j);
-                self.rows.push(Row { links, arms, normal: approach.direction, least: -gap.max(0.0) / h, impulse: 0.0 });
+        }
+        let count = island.candidates.len().div_ceil(TOGETHER);
+        self.nearby.resize_with(count.max(self.nearby.len()), Nearby::default);
+        team.each_mut(&mut self.nearby[..count], 1, |number, nearby| {
+            nearby.rows.clear();
+            (nearby.fastest, nearby.arm) = (0.0, 0.0);
+            for index in island.candidates.iter().skip(number * TOGETHER).take(TOGETHER) {
+                nearby.add(&candidates[*index as usize].pair, motions, h);
             }
+        });
+        let nearby = &self.nearby[..count];
+        self.arm = nearby.iter().map(|nearby| nearby.arm).fold(0.0, f64::max);
+        let fastest = nearby.iter().map(|nearby| nearby.fastest).fold(0.0, f64::max);
+        self.rows.clear();
+        // Nobody closes the other gaps.
+        let near = |row: &&Row| -row.least <= RUSH * fastest;
+        self.rows.extend(nearby.iter().flat_map(|nearby| &nearby.rows).filter(near));
+        for row in &mut self.rows {
+            let mobility = |side: usize| self.trial[row.links[side] as usize].mobility(&row.arms[side], &row.normal);
+            row.mobility = mobility(0) + mobility(1);
         }
         for _ in 0..SWEEPS {
             let mut changed = false;
             for row in &mut self.rows {
-                let [a, b] = row.links.map(|link| &self.trial[link as usize]);
-                let parting = (b.twist.at(&row.arms[1]) - a.twist.at(&row.arms[0])).dot(&row.normal);
-                let mobility = a.mobility(&row.arms[0], &row.normal) + b.mobility(&row.arms[1], &row.normal);
-                if mobility <= 0.0 {
+                let [a, b] = row.velocities(&self.trial);
+                let parting = (b - a).dot(&row.normal);
+                if row.mobility <= 0.0 || row.impulse == 0.0 && parting >= row.least {
                     continue;
                 }
-                let impulse = (row.impulse + (row.least - parting) / mobility).max(0.0);
+                let impulse = (row.impulse + (row.least - parting) / row.mobility).max(0.0);
                 let push = row.normal * (impulse - row.impulse);
                 changed |= impulse != row.impulse;
                 row.impulse = impulse;
@@ -247,8 +325,18 @@ impl Solver {
         }
     }
 
+    /// How much the velocity of any contact differs from `other` velocities, at most \[m/s\].
+    fn change(&self, other: &[f64]) -> f64 {
+        let size = |block: usize| {
+            let (now, then) = (twist_of(&self.x, block as u32), twist_of(other, block as u32));
+            (now.linear - then.linear).norm() + (now.angular - then.angular).norm() * self.arm
+        };
+        (0..self.order.len()).map(size).fold(0.0, f64::max)
+    }
+
     /// Evaluates the contacts where the velocities lead.
     fn look(&mut self, step: &mut Step, h: f64) {
+        self.looked.clone_from(&self.x);
         let Step { motions, island, candidates, settings, work, team } = step;
         for link in &island.links {
             self.trial[*link as usize] = motions[*link as usize];
@@ -260,28 +348,38 @@ impl Solver {
         work.look(&self.trial, island, candidates, settings, true, team);
     }
 
-    /// Puts the contact surfaces into the system; as a `last_resort`, frozen where they are.
+    /// Puts contact surfaces and springs into the system; as a `last_resort`, the surfaces frozen where they are.
     fn couple_all(&mut self, step: &Step, h: f64, last_resort: bool) {
         self.coupled.clear();
-        for index in &step.island.candidates {
-            let coupled = &mut self.coupled;
-            let carriers = &mut self.carriers;
-            let candidate = &step.candidates[*index as usize];
-            Grouping { coupled, carriers, trial: &self.trial, candidate, index: *index, h, last_resort }.add_all();
+        let Step { motions, island, candidates, team, .. } = step;
+        let (motions, candidates, trial, reach) = (&**motions, &**candidates, &self.trial, self.reach);
+        let count = island.candidates.len().div_ceil(TOGETHER);
+        self.bundles.resize_with(count.max(self.bundles.len()), Bundle::default);
+        team.each_mut(&mut self.bundles[..count], 1, |number, bundle| {
+            bundle.clear();
+            for index in island.candidates.iter().skip(number * TOGETHER).take(TOGETHER) {
+                let (candidate, index) = (&candidates[*index as usize], *index);
+                Grouping { bundle: &mut *bundle, trial, candidate, index, h, reach, last_resort }.add_all();
+            }
+        });
+        for bundle in &self.bundles[..count] {
+            self.coupled.append(bundle);
         }
-        for index in 0..self.coupled.groups.len() {
-            let group = self.coupled.groups[index];
-            self.coupled.groups[index].base = self.coupled.relative_of(&group, &self.x, step.motions);
+        self.coupled.set_base(&self.x, motions, team);
+        for spring in &island.springs {
+            let mut tie = Tie::new(spring, trial, &mut self.coupled.members);
+            tie.set_velocity(&self.coupled.relative_of(tie.members, &self.x, motions).linear);
+            self.coupled.ties.push(tie);
         }
     }
 
     /// Whether the contacts moved so little since they were evaluated that they are still what they were.
-    fn agrees(&self, motions: &[Motion], candidates: &[Candidate], h: f64, tolerance: f64) -> bool {
-        self.coupled.groups.iter().all(|group| {
-            let now = self.coupled.relative_of(group, &self.x, motions);
+    fn agrees(&self, motions: &[Motion], candidates: &[Kept], h: f64, tolerance: f64) -> bool {
+        let groups = self.coupled.groups.iter().all(|group| {
+            let now = self.coupled.relative_of(group.members, &self.x, motions);
             let change = Twist { linear: now.linear - group.base.linear, angular: now.angular - group.base.angular };
             let pair = &candidates[group.candidate as usize];
-            let speed = self.speed(group, motions, h);
+            let speed = self.speed(group.members, motions, h);
             let Some(patch) = group.patch else {
                 // A wall or a gap is exact, until it begins to push where it did not.
                 let point = &self.coupled.points[group.points.0];
@@ -298,7 +396,20 @@ impl Solver {
             let along = change.linear - patch.normal * change.linear.dot(&patch.normal);
             let across = change.linear.dot(&patch.normal).abs() + change.angular.norm() * size;
             h * across <= tolerance * depth && h * along.norm() <= tolerance * size
-        })
+        });
+        groups && self.coupled.ties.iter().all(|tie| self.tie_agrees(tie, motions, h, tolerance))
+    }
+
+    /// Whether a tie's ends came where the system took them to be. In a turn they go round, and not straight on.
+    fn tie_agrees(&self, tie: &Tie, motions: &[Motion], h: f64, tolerance: f64) -> bool {
+        let turned = |member: &Member| {
+            let turn = |x| self.coupled.twist_in(member.link, x).map_or_else(Vec3::zeros, |twist| twist.angular);
+            if member.turns { (turn(&self.x) - turn(&self.looked)).norm_squared() * h * member.arm.norm() } else { 0.0 }
+        };
+        let off = self.coupled.members[tie.members.0..tie.members.1].iter().map(turned).sum::<f64>();
+        let velocity = self.coupled.relative_of(tie.members, &self.x, motions).linear;
+        h * off <= tolerance * tie.stretch(&velocity, h).abs()
+            || off <= NEGLIGIBLE * self.speed(tie.members, motions, h)
     }
 
     /// Half the width of a group's patch.
@@ -307,9 +418,9 @@ impl Solver {
         (points.iter().map(|point| point.area).sum::<f64>() / std::f64::consts::PI).sqrt()
     }
 
-    /// The speeds that are at work in a group in this step.
-    fn speed(&self, group: &Group, motions: &[Motion], h: f64) -> f64 {
-        let members = &self.coupled.members[group.members.0..group.members.1];
+    /// The speeds that are at work among some members in this step.
+    fn speed(&self, (first, end): (usize, usize), motions: &[Motion], h: f64) -> f64 {
+        let members = &self.coupled.members[first..end];
         let speed = |member: &Member| {
             let motion = &motions[member.link as usize];
             motion.acceleration.norm() * h + NEGLIGIBLE * motion.twist.at(&member.arm).norm()
@@ -329,18 +440,15 @@ impl Solver {
                 candidate.memory.touched = true;
             }
         }
-        self.pushes.clear();
-        for group in &self.coupled.groups {
-            self.pushes.push(self.coupled.push(group, &self.x, &self.trial, h));
-        }
-        if self.pushes.iter().all(|push| push.all == Wrench::default()) {
+        let untouched = self.coupled.pushes().all(|(_, push)| push.all == Wrench::default());
+        if untouched && island.springs.is_empty() {
             fly(motions, island, h);
             return;
         }
         for link in &island.links {
             motions[*link as usize].kick(h);
         }
-        for (group, push) in self.coupled.groups.iter().zip(&self.pushes) {
+        for (group, push) in self.coupled.pushes() {
             for member in &self.coupled.members[group.members.0..group.members.1] {
                 let force = push.all.force * (h * member.weight);
                 let torque = push.all.torque * (h * member.weight) + member.arm.cross(&force);
@@ -349,18 +457,32 @@ impl Solver {
                 }
             }
         }
+        for tie in &self.coupled.ties {
+            let velocity = self.coupled.relative_of(tie.members, &self.x, &self.trial).linear;
+            let (force, _) = tie.respond(&velocity, h);
+            for member in &self.coupled.members[tie.members.0..tie.members.1] {
+                let force = force * (h * member.weight);
+                motions[member.link as usize].push(&Wrench { force, torque: member.arm.cross(&force) });
+            }
+        }
         let same = |a: &Group, b: &Group| (a.candidate, a.patch) == (b.candidate, b.patch);
         let mut first = 0;
         for groups in self.coupled.groups.chunk_by(same) {
-            let pushes = &self.pushes[first..first + groups.len()];
+            let pushes = self.coupled.pushes().skip(first).take(groups.len());
             first += groups.len();
             let Some(patch) = groups[0].patch else { continue };
             let candidate = &mut candidates[groups[0].candidate as usize];
-            let sums = patch_sums(groups, pushes, &self.coupled.points);
+            let sums = patch_sums(pushes, &self.coupled.points);
             candidate.memory.touched |= sums.force != Vec3::zeros();
             candidate.loads[patch as usize] = sums;
         }
         drift(motions, island, h);
+        if let Some(fall) = springs::fall_as_one(&island.springs, &island.links, motions).filter(|_| untouched) {
+            for link in &island.links {
+                let motion = &mut motions[*link as usize];
+                motion.center -= if motion.is_movable() { fall * (0.5 * h * h) } else { Vec3::zeros() };
+            }
+        }
         for index in &island.candidates {
             let candidate = &mut candidates[*index as usize];
             if candidate.material.static_friction > 0.0 {
@@ -395,10 +517,10 @@ impl Solver {
 }
 
 /// What the groups of one patch come to, about their common centre of pressure.
-fn patch_sums(groups: &[Group], pushes: &[Push], points: &[Point]) -> Sums {
+fn patch_sums<'a>(pushes: impl Iterator<Item = (&'a Group, &'a Push)> + Clone, points: &[Point]) -> Sums {
     let mut sums = Sums::default();
     let mut load = 0.0;
-    for (group, push) in groups.iter().zip(pushes) {
+    for (group, push) in pushes.clone() {
         let size = push.pressing.force.norm();
         sums.center += group.center * size;
         load += size;
@@ -411,7 +533,7 @@ fn patch_sums(groups: &[Group], pushes: &[Push], points: &[Point]) -> Sums {
     if load > 0.0 {
         sums.center /= load;
     }
-    for (group, push) in groups.iter().zip(pushes) {
+    for (group, push) in pushes {
         sums.torque += push.pressing.torque + (group.center - sums.center).cross(&push.pressing.force);
     }
     sums

@@ -1,8 +1,9 @@
 //! One sub-step: drift, evaluate the contact surfaces, kick, drift. Symplectic, of second order, with one evaluation.
 
-use crate::base::Motion;
+use super::springs;
+use crate::base::{Motion, Spring};
 use crate::clock::Clock;
-use crate::contact::candidate::Candidate;
+use crate::contact::candidate::{Candidate, Kept};
 use crate::contact::friction;
 use crate::contact::pair::Pair;
 use crate::contact::press::{Carriers, Grip, friction_radius, press};
@@ -20,8 +21,10 @@ pub const PUSH_OUT: f64 = 2.0;
 pub struct Island {
     /// Slots of the links that move, each once.
     pub links: Vec<u32>,
-    /// Positions in the list of candidates, in ascending order.
+    /// Positions in a list of candidates, in ascending order.
     pub candidates: Vec<u32>,
+    /// Springs between the links.
+    pub springs: Vec<Spring>,
 }
 
 /// Candidates that a worker looks at in one go.
@@ -33,8 +36,8 @@ pub struct Step<'a> {
     pub motions: &'a mut [Motion],
     /// Who is stepped.
     pub island: &'a Island,
-    /// All candidates.
-    pub candidates: &'a mut [Candidate],
+    /// Their candidates, and maybe others.
+    pub candidates: &'a mut [Kept],
     /// How contact surfaces are integrated.
     pub settings: &'a Settings,
     /// Working memory.
@@ -65,7 +68,7 @@ impl Work {
         &mut self,
         motions: &[Motion],
         island: &Island,
-        candidates: &mut [Candidate],
+        candidates: &mut [Kept],
         settings: &Settings,
         fresh: bool,
         team: &Team,
@@ -95,14 +98,17 @@ impl Step<'_> {
                 bend_bristles(candidate, motions, h, &mut work.carriers);
             }
         }
+        springs::damp(island.springs.iter(), motions, 0.5 * h);
         for link in &island.links {
             motions[*link as usize].kick(h);
         }
+        springs::kick(&island.springs, motions, h);
         work.grips.clear();
         for index in &island.candidates {
             press_candidate(&mut candidates[*index as usize], *index as usize, motions, h, work);
         }
         rub(candidates, motions, h, work);
+        springs::damp(island.springs.iter().rev(), motions, 0.5 * h);
         drift(motions, island, (1.0 - before) * h);
         clock.lap(&mut work.solve_time);
     }
@@ -185,9 +191,9 @@ fn push_out(pair: &Pair, approach: &Approach, speed: f64, motions: &mut [Motion]
     }
 }
 
-fn rub(candidates: &mut [Candidate], motions: &mut [Motion], h: f64, work: &mut Work) {
+fn rub(candidates: &mut [Kept], motions: &mut [Motion], h: f64, work: &mut Work) {
     for grip in &work.grips {
-        let Candidate { pair, material, memory, .. } = &mut candidates[grip.candidate];
+        let Candidate { pair, material, memory, .. } = &mut *candidates[grip.candidate];
         work.carriers.find(pair, &grip.position);
         let bristle = memory.bristles.iter_mut().find(|bristle| bristle.key == grip.key);
         friction::rub(grip, material, bristle, h, &work.carriers, motions, &pair.origin);

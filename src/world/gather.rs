@@ -1,7 +1,11 @@
 //! Gathering: from the nouns of the world to the motions and candidate pairs that the step works on.
 
+use std::borrow::Cow;
+use std::sync::Arc;
+
 use super::{Body, Link, Skeleton, World};
 use crate::base::{Inertia, Kind, Motion};
+use crate::coat::seeds::Ray;
 use crate::contact::broad_phase::Bounds;
 use crate::contact::candidate::Candidate;
 use crate::contact::pair::{Cover, Side};
@@ -96,6 +100,7 @@ impl World {
                 side.add(&part, position, self.desc.seed_count);
             }
         }
+        side.end();
         if let Some(blending) = &body.blending {
             blending.graph.restrict(&side.positions, &mut side.graph);
         }
@@ -142,6 +147,7 @@ impl World {
                     side.add(&part, *position as usize, self.desc.seed_count);
                 }
             }
+            side.end();
         }
         if (0..3).any(|axis| region.0[axis] > region.1[axis])
             || pair.a.skeletons.is_empty()
@@ -192,14 +198,25 @@ impl Side {
         self.links.push(*link);
         self.ids.push(*index);
         self.reach.push(skeleton.reach);
-        self.rays.push(skeleton.rays(seed_count));
+        let rays = skeleton.rays(seed_count);
+        match self.rays.get_mut(self.skeletons.len() - 1) {
+            // Nobody counts references while nothing changes: workers would wait for each other.
+            Some(old) if Arc::ptr_eq(old, &rays) => {}
+            Some(old) => *old = rays.into_owned(),
+            None => self.rays.push(rays.into_owned()),
+        }
+    }
+
+    /// Drops what is left of the last filling.
+    fn end(&mut self) {
+        self.rays.truncate(self.skeletons.len());
     }
 }
 
 impl Skeleton {
     /// The skeleton's rays in its link's frame, made at the first use. None for a plane: its lattice depends on what
     /// lies on it. They are those of the coat without an offset, so that they stay the same while it swells.
-    pub(super) fn rays(&self, default_count: u32) -> std::sync::Arc<[crate::coat::seeds::Ray]> {
+    pub(super) fn rays(&self, default_count: u32) -> Cow<'_, Arc<[Ray]>> {
         let count = if self.desc.seed_count == 0 { default_count } else { self.desc.seed_count };
         let make = || {
             let mut rays = Vec::new();
@@ -209,7 +226,7 @@ impl Skeleton {
             (count, rays.into())
         };
         let (made_for, rays) = self.rays.get_or_init(make);
-        if *made_for == count { rays.clone() } else { make().1 }
+        if *made_for == count { Cow::Borrowed(rays) } else { Cow::Owned(make().1) }
     }
 }
 

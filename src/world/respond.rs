@@ -6,7 +6,6 @@ use super::World;
 use super::events::{Counters, LogLevel};
 use super::step::{Group, Outcome, Stepping};
 use crate::base::{Kind, Motion};
-use crate::contact::candidate::Candidate;
 use crate::contact::surface;
 use crate::contact::tally::Tally;
 use crate::math::Wrench;
@@ -18,8 +17,14 @@ use crate::team::Team;
 /// responses.
 const STACKED: u8 = 10;
 
+/// Turn of a spring's swing in a step from which on it is stiff \[rad\].
+const STIFF: f64 = 0.3;
+
 /// Candidates from which on an island is stepped by all workers, and not by one of them beside other islands.
 const WIDE: usize = 24;
+
+/// Islands that a worker takes in one go.
+const BLOCK: usize = 4;
 
 /// What each worker needs for itself.
 #[derive(Debug, Default)]
@@ -27,6 +32,8 @@ pub(super) struct Worker {
     /// All links, for islands that are stepped beside others; once they are those of this step.
     motions: Vec<Motion>,
     ready: bool,
+    /// A place for each link.
+    rates: Vec<f64>,
     pub work: Work,
     implicit: implicit::Solver,
 }
@@ -44,13 +51,12 @@ impl Rules {
         &self,
         group: &mut Group,
         motions: &mut [Motion],
-        candidates: &mut [Candidate],
         work: &mut Work,
         solver: &mut implicit::Solver,
         team: &Team,
     ) {
         let dt = self.dt;
-        let Group { island, response, substeps, supports, driven, carried, outcome, .. } = group;
+        let Group { island, candidates, response, substeps, supports, driven, carried, outcome, .. } = group;
         driven.clear();
         for link in &island.links {
             let motion = &motions[*link as usize];
@@ -105,49 +111,60 @@ fn idle(workers: &[Mutex<Worker>]) -> (usize, MutexGuard<'_, Worker>) {
     }
 }
 
-/// Steps the islands that are marked for it, each by one worker with all links for itself. Islands take their candidates
-/// along.
+/// Steps the islands that are marked for it, each by one worker with all links for itself.
 fn step_beside_each_other(state: &mut Stepping, rules: &Rules, team: &Team) {
-    let Stepping { islands, candidates, motions, workers, .. } = state;
-    let groups = &mut islands[..state.island_count];
-    for group in groups.iter_mut().filter(|group| group.beside) {
-        for (place, index) in group.island.candidates.iter_mut().enumerate() {
-            group.candidates.push(std::mem::take(&mut candidates[*index as usize]));
-            group.places.push(std::mem::replace(index, place as u32));
-        }
-    }
-    team.each_mut(groups, 1, |_, group| {
+    let Stepping { islands, motions, workers, .. } = state;
+    team.each_mut(&mut islands[..state.island_count], BLOCK, |_, group| {
         if !group.beside {
             return;
         }
         let (number, mut worker) = idle(workers);
-        let Worker { motions: own, ready, work, implicit } = &mut *worker;
+        let Worker { motions: own, ready, work, implicit, .. } = &mut *worker;
         if !std::mem::replace(ready, true) {
             own.clone_from(motions);
         }
-        let mut candidates = std::mem::take(&mut group.candidates);
-        rules.step(group, own, &mut candidates, work, implicit, &Team::alone());
-        (group.candidates, group.worker) = (candidates, number);
+        rules.step(group, own, work, implicit, &Team::alone());
+        group.worker = number;
+    });
+}
+
+/// Sub-steps that each island asks for which may be taken in such.
+fn plan(state: &mut Stepping, rules: &Rules, team: &Team) {
+    let Stepping { islands, motions, workers, .. } = state;
+    team.each_mut(&mut islands[..state.island_count], BLOCK, |_, group| {
+        if group.response == Response::Substepped {
+            let Group { island, candidates, .. } = group;
+            let rates = &mut idle(workers).1.rates;
+            rates.resize(motions.len(), 0.0);
+            group.substeps = substepped::plan(motions, island, candidates, rules.dt, &rules.limits, rates);
+        }
     });
 }
 
 impl Group {
     /// Whether one worker is enough for it.
     fn is_small(&self) -> bool {
-        (1..WIDE).contains(&self.island.candidates.len())
+        self.candidates.len() < WIDE
+    }
+}
+
+impl Stepping {
+    /// Gives each island its candidates.
+    fn hand_out_candidates(&mut self) {
+        for (candidate, owner) in self.candidates.drain(..).zip(&self.owners) {
+            self.islands[*owner as usize].candidates.push(candidate);
+        }
+        for Group { island, candidates, .. } in &mut self.islands[..self.island_count] {
+            island.candidates.clear();
+            island.candidates.extend(0..candidates.len() as u32);
+        }
     }
 
-    /// Gives back what an island took along when it was stepped beside others, with the links that it moved.
-    fn return_to(&mut self, motions: &mut [Motion], candidates: &mut [Candidate], moved: &[Motion]) {
-        for (index, candidate) in self.candidates.drain(..).enumerate() {
-            let place = self.places[index];
-            self.island.candidates[index] = place;
-            candidates[place as usize] = candidate;
-        }
-        self.places.clear();
-        for link in self.island.links.iter().filter(|link| self.supports.binary_search(link).is_err()) {
-            motions[*link as usize] = moved[*link as usize];
-        }
+    /// Takes them back, in their order.
+    fn collect_candidates(&mut self) {
+        let last = |owner: &u32| self.islands[*owner as usize].candidates.pop();
+        self.candidates.extend(self.owners.iter().rev().filter_map(last));
+        self.candidates.reverse();
     }
 }
 
@@ -166,22 +183,24 @@ impl World {
         state.responses.clear();
         state.responses.resize(self.links.capacity(), Response::Auto);
         self.notice_stacks(state);
-        for index in 0..state.island_count {
-            let (mut response, forced) = self.choose(&state.islands[index].island, state);
-            if response == Response::Substepped {
-                let (island, rates) = (&state.islands[index].island, &mut state.rates);
-                let wanted = substepped::plan(&state.motions, island, &mut state.candidates, dt, &rules.limits, rates);
-                // Too few sub-steps would gain energy without end.
-                if wanted > f64::from(rules.limits.most) && !forced {
-                    response = Response::Implicit;
-                }
-                state.islands[index].substeps = wanted;
-            }
-            state.islands[index].response = response;
-            self.meet_hosts(state, index, response, dt);
-        }
         while state.workers.len() < team.workers() {
             state.workers.push(Mutex::default());
+        }
+        for index in 0..state.island_count {
+            let (response, forced) = self.choose(&state.islands[index].island, state, dt);
+            (state.islands[index].response, state.islands[index].forced) = (response, forced);
+        }
+        state.hand_out_candidates();
+        plan(state, &rules, team);
+        for index in 0..state.island_count {
+            let group = &mut state.islands[index];
+            // Too few sub-steps would gain energy without end.
+            if group.response == Response::Substepped && group.substeps > f64::from(rules.limits.most) && !group.forced
+            {
+                group.response = Response::Implicit;
+            }
+            let response = group.response;
+            self.meet_hosts(state, index, response, dt);
         }
         for worker in &mut state.workers {
             let Worker { ready, work, .. } = unlocked(worker);
@@ -199,8 +218,9 @@ impl World {
         let groups = &mut state.islands[..state.island_count];
         let Worker { work, implicit, .. } = unlocked(&mut state.workers[0]);
         for group in groups.iter_mut().filter(|group| !group.beside) {
-            rules.step(group, &mut state.motions, &mut state.candidates, work, implicit, team);
+            rules.step(group, &mut state.motions, work, implicit, team);
         }
+        state.collect_candidates();
         self.gather_up(state, &rules.limits);
     }
 
@@ -213,7 +233,10 @@ impl World {
         let mut short = 0.0f64;
         for group in groups.iter_mut() {
             if group.beside {
-                group.return_to(motions, candidates, &unlocked(&mut workers[group.worker]).motions);
+                let moved = &unlocked(&mut workers[group.worker]).motions;
+                for link in group.island.links.iter().filter(|link| group.supports.binary_search(link).is_err()) {
+                    motions[*link as usize] = moved[*link as usize];
+                }
             }
             let Outcome { substeps, rounds, splits } = group.outcome;
             counters.substeps = counters.substeps.max(substeps);
@@ -253,8 +276,11 @@ impl World {
     fn notice_stacks(&mut self, state: &mut Stepping) {
         state.touches.clear();
         state.touches.resize(self.bodies.capacity(), 0);
-        let between = |candidate: &&Candidate| candidate.bodies[0] != candidate.bodies[1];
-        for candidate in state.candidates.iter().filter(between).filter(|candidate| candidate.memory.touching) {
+        for candidate in state
+            .candidates
+            .iter()
+            .filter(|candidate| candidate.memory.touching && candidate.bodies[0] != candidate.bodies[1])
+        {
             for body in candidate.bodies {
                 state.touches[body as usize] += 1;
             }
@@ -268,9 +294,9 @@ impl World {
     }
 
     /// The response of an island. What a body or the world forces holds for all that it touches, the most stable first;
-    /// left to itself, implicit is for what is jointed, held by its host, or stacked, and sub-steps for the rest. Also
-    /// whether it is forced.
-    fn choose(&self, island: &Island, state: &Stepping) -> (Response, bool) {
+    /// left to itself, implicit is for what is jointed, held by its host, stacked, or on stiff springs, and sub-steps for
+    /// the rest. Also whether it is forced.
+    fn choose(&self, island: &Island, state: &Stepping, dt: f64) -> (Response, bool) {
         let movable = |link: &&u32| state.motions[**link as usize].is_movable();
         let links = || island.links.iter().filter(movable).map(|link| &self.links[*link as usize]);
         let forced = |response| {
@@ -288,7 +314,8 @@ impl World {
             let host = link.desc.kind == Kind::Host && (link.desc.constrained || link.mirror.is_doubtful());
             host || self.bodies[link.body as usize].stacked > 0
         });
-        let implicit = held && !island.candidates.is_empty();
+        let stiff = island.springs.iter().any(|spring| spring.rate2(&state.motions).sqrt() * dt > STIFF);
+        let implicit = held && !island.candidates.is_empty() || stiff;
         (if implicit { Response::Implicit } else { Response::Substepped }, false)
     }
 

@@ -9,7 +9,7 @@ use super::step::Stepping;
 use super::volume::Control;
 use super::{Body, BodyId, Contact, Link, World};
 use crate::base::Kind;
-use crate::contact::candidate::{Candidate, Memory};
+use crate::contact::candidate::Memory;
 use crate::error::Result;
 use crate::handle::Arena;
 use crate::math::Twist;
@@ -123,7 +123,7 @@ impl World {
             state.candidates.push(candidate);
         }
         if state.candidates.len() > before {
-            state.candidates.sort_unstable_by_key(Candidate::key);
+            state.candidates.sort_unstable_by_key(|candidate| candidate.key());
         }
     }
 

@@ -8,7 +8,7 @@
 //! | 12 | version of the library that wrote it, as text filled up with zeros |
 //! | 8 | length of the whole |
 //! | 8 | origin: whose handles the objects have |
-//! | … | settings; bodies, links, skeletons with their slots; the memory of each pair of bodies near each other |
+//! | … | settings; bodies, links, skeletons, springs with their slots; the memory of each pair of bodies near each other |
 //! | 4 | CRC-32 of all before, which sees any damage of up to 32 bits in a row |
 //!
 //! What is written of each type stands in the lists below. A change of any list is a new [`FORMAT`].
@@ -19,8 +19,8 @@ use super::blend::{Blending, Pairing};
 use super::bytes::{Counter, Cursor, Lasting, Reader, Sink, enums, structs, write_list};
 use super::sleep::Sleep;
 use super::{
-    Body, BodyDesc, Contact, Link, LinkDesc, Skeleton, SkeletonDesc, StiffnessRule, World, WorldDesc, check_plane,
-    desc, step, units::Said,
+    Body, BodyDesc, Contact, Link, LinkDesc, Skeleton, SkeletonDesc, Spring, SpringDesc, StiffnessRule, World,
+    WorldDesc, check_plane, desc, step, units::Said,
 };
 use crate::base::Kind;
 use crate::coat::volume::OFFSETS;
@@ -71,8 +71,12 @@ structs! {
         user_data,
     }
     SkeletonDesc { shape, thickness, stiffness, stiffening, radius, seed_count, user_data }
+    SpringDesc { links, points, rest_length, stiffness, damping, user_data }
     // What the descriptor comes to follows from the parts.
-    Body { desc, links, enabled, stacked, units, blending, sleep; stiffness_scale: 0.0, dissipation: 0.0, volume: None }
+    Body {
+        desc, links, springs, enabled, stacked, units, blending, sleep;
+        stiffness_scale: 0.0, dissipation: 0.0, volume: None
+    }
     Blending {
         by_links, joints, pairs;
         graph: Graph::default(), together: Vec::new(), order: Vec::new(), blocks: Vec::new()
@@ -83,6 +87,7 @@ structs! {
     }
     // The profile and the reach follow from the descriptors; the rays are made at their first use.
     Skeleton { desc, link, enabled, offset, target; profile: NO_PROFILE, reach: 0.0, rays: Default::default() }
+    Spring { desc }
     Said { sink, travel }
     Sleep { quiet, group }
     Mirror {
@@ -280,6 +285,7 @@ impl World {
             bodies,
             links,
             skeletons,
+            springs,
             log: _,
             pair_filter: _,
             tasks: _,
@@ -291,6 +297,7 @@ impl World {
         write_arena(bodies, out);
         write_arena(links, out);
         write_arena(skeletons, out);
+        write_arena(springs, out);
         let (candidates, resting, contacts) = stepping.lasting();
         write_list(candidates.len(), candidates.iter().map(|candidate| candidate.lasting()), out);
         write_list(resting.len(), resting.iter(), out);
@@ -320,6 +327,7 @@ impl World {
             bodies: read_arena(&mut from)?,
             links: read_arena(&mut from)?,
             skeletons: read_arena(&mut from)?,
+            springs: read_arena(&mut from)?,
             log: Alone::default(),
             pair_filter: Alone::default(),
             tasks: Alone::default(),
@@ -343,6 +351,7 @@ impl World {
             fresh.bodies.go_on_from(&self.bodies);
             fresh.links.go_on_from(&self.links);
             fresh.skeletons.go_on_from(&self.skeletons);
+            fresh.springs.go_on_from(&self.springs);
             self.own_tag.number()
         } else {
             // Of the same origin are only those snapshots that this world takes from now on.
@@ -353,6 +362,12 @@ impl World {
         fresh.bodies.set_world(tag);
         fresh.links.set_world(tag);
         fresh.skeletons.set_world(tag);
+        fresh.springs.set_world(tag);
+        for index in 0..fresh.springs.capacity() {
+            if let Some(spring) = fresh.springs.at_mut(index) {
+                spring.desc.links.iter_mut().for_each(|id| id.raw.world = tag);
+            }
+        }
         for id in memories.iter_mut().chain(&mut resting).flat_map(|memory| &mut memory.ids) {
             id.world = tag;
         }
@@ -370,6 +385,7 @@ impl World {
             bodies,
             links,
             skeletons,
+            springs,
             log: _,
             pair_filter: _,
             tasks: _,
@@ -378,17 +394,25 @@ impl World {
         } = fresh;
         self.controls_volumes = controls_volumes;
         (self.desc, self.origin) = (desc, origin);
-        (self.bodies, self.links, self.skeletons) = (bodies, links, skeletons);
+        (self.bodies, self.links, self.skeletons, self.springs) = (bodies, links, skeletons, springs);
         self.stepping.restart(memories, resting, contacts);
         Ok(())
     }
 
-    /// Every link belongs to the one body that lists it, every skeleton to the one link.
+    /// Every link belongs to the one body that lists it, every skeleton to the one link, every spring to the body of its
+    /// links.
     fn check_owners(&self) -> Result<()> {
         let bodies = self.bodies.indices().map(|body| (body, &self.bodies[body].links));
         let links = self.links.indices().map(|link| (link, &self.links[link].skeletons));
-        check_lists("body", bodies, &self.links, |link| link.body)?;
-        check_lists("link", links, &self.skeletons, |skeleton| skeleton.link)
+        check_lists("body", bodies, &self.links, |_, link| link.body)?;
+        check_lists("link", links, &self.skeletons, |_, skeleton| skeleton.link)?;
+        let mut body_of = vec![0; self.springs.capacity()];
+        for index in self.springs.indices() {
+            let body = self.check_spring(&self.springs[index].desc);
+            body_of[index] = body.map_err(|error| refused(format_args!("spring {index}"), error))?.raw.index;
+        }
+        let springs = self.bodies.indices().map(|body| (body, &self.bodies[body].springs));
+        check_lists("body", springs, &self.springs, |index, _| body_of[index])
     }
 
     /// Descriptors as creation checks them, and the rest of what a step begins with.
@@ -575,12 +599,12 @@ fn check_lists<'a, T: Noun>(
     owner_noun: &str,
     lists: impl Iterator<Item = (usize, &'a Vec<u32>)>,
     owned: &Arena<T>,
-    owner_of: impl Fn(&T) -> u32,
+    owner_of: impl Fn(usize, &T) -> u32,
 ) -> Result<()> {
     let mut is_listed = vec![false; owned.capacity()];
     for (owner, list) in lists {
         for index in list.iter().map(|index| *index as usize) {
-            let ours = owned.is_live(index) && owner_of(&owned[index]) as usize == owner;
+            let ours = owned.is_live(index) && owner_of(index, &owned[index]) as usize == owner;
             if !ours || std::mem::replace(&mut is_listed[index], true) {
                 let noun = T::NAME;
                 return Err(Error::Snapshot(format!(

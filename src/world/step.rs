@@ -10,7 +10,7 @@ use crate::base::{Kind, Motion};
 use crate::clock::Clock;
 use crate::coat::cliques::Block;
 use crate::contact::broad_phase::{self, Bounds};
-use crate::contact::candidate::{Candidate, Memory};
+use crate::contact::candidate::{Candidate, Kept, Memory};
 use crate::contact::{pair::Side, surface};
 use crate::error::{Result, require};
 use crate::math::{Quat, Vec3, Wrench};
@@ -38,10 +38,10 @@ pub(crate) struct Stepping {
     met: Vec<[u32; 2]>,
     meetings: Vec<Meeting>,
     /// In the order of their bodies.
-    pub(super) candidates: Vec<Candidate>,
+    pub(super) candidates: Vec<Kept>,
     /// Those of the last step, then their memory for reuse.
-    previous: Vec<Candidate>,
-    pub(super) spare: Vec<Candidate>,
+    previous: Vec<Kept>,
+    pub(super) spare: Vec<Kept>,
     /// Of the pairs that are asleep, in the order of their bodies.
     pub(super) resting: Vec<Memory>,
     /// How many contacts at the front are of bodies asleep, and a number that changes whenever these do.
@@ -56,9 +56,10 @@ pub(crate) struct Stepping {
     pub(super) island_count: usize,
     roots: Vec<u32>,
     island_of: Vec<u32>,
+    /// The island of each candidate.
+    pub(super) owners: Vec<u32>,
     /// Contacts at the end of the last step, by slot of the body.
     pub(super) touches: Vec<u32>,
-    pub(super) rates: Vec<f64>,
     /// Working memory of each worker; the first always is the thread that steps.
     pub(super) workers: Vec<Mutex<Worker>>,
     pub(super) contacts: Vec<Contact>,
@@ -80,15 +81,16 @@ struct Meeting {
 pub(super) struct Group {
     pub island: Island,
     pub response: Response,
+    /// The world or a body asks for it.
+    pub forced: bool,
     /// Sub-steps that it asks for.
     pub substeps: f64,
     /// Links that it leans on: they do not move, and other islands may lean on them too.
     pub supports: Vec<u32>,
     /// The contact impulses that they got from it.
     pub carried: Vec<Wrench>,
-    /// Its own candidates and their places, while it is stepped beside others.
-    pub candidates: Vec<Candidate>,
-    pub places: Vec<u32>,
+    /// Its own candidates, while it is stepped.
+    pub candidates: Vec<Kept>,
     /// Links that the host moves whatever happens, with the poses that they start from.
     pub driven: Vec<(u32, (Vec3, Quat))>,
     /// It is stepped beside others, by which worker, and what came out.
@@ -127,7 +129,7 @@ impl Stepping {
     }
 
     /// What a snapshot keeps. The rest are buffers and reports; whoever adds a field decides here.
-    pub fn lasting(&self) -> (&[Candidate], &[Memory], &[Contact]) {
+    pub fn lasting(&self) -> (&[Kept], &[Memory], &[Contact]) {
         let Self {
             candidates,
             resting,
@@ -151,8 +153,8 @@ impl Stepping {
             island_count: _,
             roots: _,
             island_of: _,
+            owners: _,
             touches: _,
-            rates: _,
             workers: _,
             contacts,
             events: _,
@@ -235,7 +237,6 @@ impl World {
     fn begin(&mut self, state: &mut Stepping, dt: f64) {
         let settled = std::mem::replace(&mut state.settled, true);
         state.motions.resize(self.links.capacity(), Motion::default());
-        state.rates.resize(self.links.capacity(), 0.0);
         for index in 0..self.links.capacity() {
             if !self.links.is_live(index) || settled && self.sleeps(&self.links[index]) {
                 continue;
@@ -299,14 +300,14 @@ impl World {
             // A body that took over the slot of a destroyed one is another body.
             let ids = bodies.map(|body| self.bodies.id_of(body as usize).raw);
             let known = state.previous.get(old).is_some_and(|last| last.key() == key && last.memory.ids == ids);
-            let mut candidate = if known {
-                std::mem::take(&mut state.previous[old])
+            let mut candidate = state.spare.pop().unwrap_or_default();
+            candidate.memory.forget();
+            if known {
+                std::mem::swap(&mut candidate, &mut state.previous[old]);
+                old += 1;
             } else {
-                let mut fresh = state.spare.pop().unwrap_or_default();
-                fresh.memory.forget();
-                (fresh.memory.ids, fresh.memory.part) = (ids, *part);
-                fresh
-            };
+                (candidate.memory.ids, candidate.memory.part) = (ids, *part);
+            }
             (candidate.bodies, candidate.block) = (*bodies, *block);
             state.candidates.push(candidate);
         }
@@ -406,6 +407,7 @@ impl World {
         for group in &mut state.islands {
             group.island.links.clear();
             group.island.candidates.clear();
+            group.island.springs.clear();
             group.supports.clear();
         }
         state.island_of.clear();
@@ -421,11 +423,13 @@ impl World {
             }
             island_of[root as usize] as usize
         };
+        state.owners.clear();
         for (index, candidate) in state.candidates.iter().enumerate() {
             let [a, b] = candidate.bodies;
             let root = find(&mut state.roots, if movable(a) { a } else { b });
             let island = island_for(root, &mut state.islands, &mut state.island_of);
             state.islands[island].island.candidates.push(index as u32);
+            state.owners.push(island as u32);
         }
         for body in self.bodies.indices() {
             if !self.bodies[body].enabled {
@@ -435,7 +439,9 @@ impl World {
             if movable(body as u32) {
                 let root = find(&mut state.roots, body as u32);
                 let island = island_for(root, &mut state.islands, &mut state.island_of);
-                state.islands[island].island.links.extend(&self.bodies[body].links);
+                let island = &mut state.islands[island].island;
+                island.links.extend(&self.bodies[body].links);
+                self.gather_springs(&self.bodies[body], &state.motions, &mut island.springs);
             }
         }
         state.island_count = count;
@@ -516,10 +522,7 @@ impl World {
                 state.events.push(Event { kind: EventKind::End, bodies });
             }
             gone.memory.forget();
-            // Those taken over into this step left an empty place behind.
-            if gone.pair.a.skeletons.capacity() > 0 {
-                state.spare.push(gone);
-            }
+            state.spare.push(gone);
         }
         for candidate in &mut state.candidates {
             let bodies = candidate.bodies.map(|body| self.bodies.id_of(body as usize));

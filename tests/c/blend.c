@@ -42,7 +42,7 @@ static size_t contacts(isocoat_world *world, isocoat_body body)
 
 static void joints_say_who_blends_and_who_collides(void)
 {
-    isocoat_world *world = new_world(0.0);
+    isocoat_world *world = new_world();
     const limbs body = three_balls(world);
     const isocoat_skeleton *s = body.skeletons;
     const isocoat_link joints[4] = {body.links[0], body.links[1], body.links[1], body.links[2]};
@@ -66,7 +66,7 @@ static void joints_say_who_blends_and_who_collides(void)
 
 static void a_weight_takes_its_time(void)
 {
-    isocoat_world *world = new_world(0.0);
+    isocoat_world *world = new_world();
     const limbs body = three_balls(world);
     const isocoat_skeleton *s = body.skeletons;
     int tick;
@@ -82,7 +82,7 @@ static void a_weight_takes_its_time(void)
 static void what_makes_no_sense_is_refused_and_changes_nothing(void)
 {
     const isocoat_status unsupported = ISOCOAT_ERROR_UNSUPPORTED, range = ISOCOAT_ERROR_OUT_OF_RANGE;
-    isocoat_world *world = new_world(0.0);
+    isocoat_world *world = new_world();
     const limbs body = three_balls(world), other = three_balls(world);
     const isocoat_skeleton *s = body.skeletons;
     const isocoat_link foreign[2] = {body.links[0], other.links[0]}, itself[2] = {body.links[0], body.links[0]};
