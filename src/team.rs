@@ -51,19 +51,26 @@ pub struct Team {
     main: usize,
     /// A job is being done; what is asked for meanwhile, its asker does alone.
     busy: AtomicBool,
+    job: Line<Job>,
+    /// Blocks of the job that are done.
+    done: Line<AtomicUsize>,
+    /// Read all the time by those who look for work, and written once.
+    stopped: Line<AtomicBool>,
+    panic: Mutex<Option<Box<dyn Any + Send>>>,
+}
+
+/// A job, together, so that who looks for work gets it at once.
+#[derive(Default)]
+struct Job {
     /// Number of the job in the upper half; the blocks that nobody has taken, from which one and up to which one, in
     /// the quarters of the lower.
-    open: Line<AtomicU64>,
-    /// The job: a closure and who can call it, how many places it has, and how many of them make a block. Changed only
-    /// while no block is open or at work.
+    open: AtomicU64,
+    /// A closure and who can call it, how many places it has, and how many of them make a block. Changed only while no
+    /// block is open or at work.
     closure: AtomicPtr<()>,
     caller: AtomicPtr<()>,
     count: AtomicUsize,
     block: AtomicUsize,
-    /// Blocks of the job that are done.
-    done: Line<AtomicUsize>,
-    stopped: AtomicBool,
-    panic: Mutex<Option<Box<dyn Any + Send>>>,
 }
 
 /// What many threads write to lies by itself, so that they do not take each other's neighbours away.
@@ -96,13 +103,9 @@ impl Team {
             helpers,
             main: this_thread(),
             busy: AtomicBool::new(false),
-            open: Line::default(),
-            closure: AtomicPtr::default(),
-            caller: AtomicPtr::default(),
-            count: AtomicUsize::new(0),
-            block: AtomicUsize::new(1),
+            job: Line::default(),
             done: Line::default(),
-            stopped: AtomicBool::new(false),
+            stopped: Line::default(),
             panic: Mutex::new(None),
         }
     }
@@ -139,7 +142,7 @@ impl Team {
             return;
         }
         let mut idle = 0;
-        while !self.stopped.load(Ordering::Acquire) {
+        while !self.stopped.0.load(Ordering::Acquire) {
             if self.take_block(true) {
                 idle = 0;
             } else if idle < PATIENCE {
@@ -175,12 +178,13 @@ impl Team {
             return;
         }
         self.done.0.store(0, Ordering::Relaxed);
-        self.closure.store(std::ptr::from_ref(work).cast_mut().cast(), Ordering::Relaxed);
-        self.caller.store(call::<F> as Caller as *mut (), Ordering::Relaxed);
-        self.count.store(count, Ordering::Relaxed);
-        self.block.store(block, Ordering::Relaxed);
-        let job = (self.open.0.load(Ordering::Relaxed) >> 32) + 1;
-        self.open.0.store(job << 32 | blocks as u64, Ordering::Release);
+        let job = &self.job.0;
+        job.closure.store(std::ptr::from_ref(work).cast_mut().cast(), Ordering::Relaxed);
+        job.caller.store(call::<F> as Caller as *mut (), Ordering::Relaxed);
+        job.count.store(count, Ordering::Relaxed);
+        job.block.store(block, Ordering::Relaxed);
+        let number = (job.open.load(Ordering::Relaxed) >> 32) + 1;
+        job.open.store(number << 32 | blocks as u64, Ordering::Release);
         while self.take_block(false) {}
         let mut waited = 0;
         while self.done.0.load(Ordering::Acquire) < blocks {
@@ -197,15 +201,16 @@ impl Team {
     /// Does one block, from one end or the other: who always takes the same end finds its own work of the last job in its
     /// cache. False when none is open.
     fn take_block(&self, last: bool) -> bool {
-        let open = self.open.0.load(Ordering::Acquire);
+        let job = &self.job.0;
+        let open = job.open.load(Ordering::Acquire);
         let (low, high) = ((open >> 16 & 0xffff) as usize, (open & 0xffff) as usize);
         if low == high {
             return false;
         }
         let (index, rest) = if last { (high - 1, open - 1) } else { (low, open + (1 << 16)) };
-        let (closure, caller) = (self.closure.load(Ordering::Relaxed), self.caller.load(Ordering::Relaxed));
-        let (count, block) = (self.count.load(Ordering::Relaxed), self.block.load(Ordering::Relaxed));
-        if self.open.0.compare_exchange(open, rest, Ordering::Acquire, Ordering::Relaxed).is_err() {
+        let (closure, caller) = (job.closure.load(Ordering::Relaxed), job.caller.load(Ordering::Relaxed));
+        let (count, block) = (job.count.load(Ordering::Relaxed), job.block.load(Ordering::Relaxed));
+        if job.open.compare_exchange(open, rest, Ordering::Acquire, Ordering::Relaxed).is_err() {
             return true;
         }
         let first = index * block;
@@ -288,7 +293,7 @@ struct Stop<'a>(&'a Team);
 
 impl Drop for Stop<'_> {
     fn drop(&mut self) {
-        self.0.stopped.store(true, Ordering::Release);
+        self.0.stopped.0.store(true, Ordering::Release);
     }
 }
 

@@ -247,6 +247,9 @@ fn halve(
     nodes: &mut Vec<Node>,
 ) -> Option<f64> {
     let Workspace { lines, nodes: pool, over_azimuths, along_radius } = workspace;
+    // Room for twice as many as the last time: what rests asks for no memory, though its counts change a little.
+    lines.reserve(lines.len());
+    pool.reserve(pool.len());
     lines.clear();
     pool.clear();
     let part = 0.5 * (1.0 - SOLVING) * tolerance;
@@ -350,6 +353,8 @@ impl Halving {
         most: usize,
         mut f: impl FnMut(f64) -> Option<Vec3>,
     ) -> Option<Integral> {
+        self.points.reserve(self.points.len());
+        self.pieces.reserve(self.pieces.len());
         self.points.clear();
         self.pieces.clear();
         let step = length / (4 * count) as f64;
