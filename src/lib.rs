@@ -8,7 +8,7 @@
 //! - [`math`], [`error`], [`handle`], [`team`], [`clock`]: vectors and poses, one error enum, ids of objects, work side
 //!   by side;
 //! - [`field`]: what skeletons emit, and how it adds up;
-//! - [`base`]: the links that carry skeletons;
+//! - [`base`]: the links that carry skeletons, and the springs between them;
 //! - [`coat`]: the implicit layer of one body: seeds and territories;
 //! - [`contact`]: where two coats meet, with what pressure, friction and dissipation;
 //! - [`response`]: how the forces move links, and what the host is told;

@@ -10,7 +10,7 @@ use common::{Coat, ball_inertia, box_inertia};
 use isocoat::base::Kind;
 use isocoat::field::Shape;
 use isocoat::math::{Pose, Vec3};
-use isocoat::world::{BodyDesc, LinkDesc, Scheme, World, WorldDesc};
+use isocoat::world::{BodyDesc, LinkDesc, LinkId, Response, Scheme, SpringDesc, World, WorldDesc};
 
 thread_local! {
     static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
@@ -123,6 +123,34 @@ fn a_step_of_a_mixed_resting_scene_allocates_nothing() {
         count
     });
     assert_eq!(counts, [0; 4]);
+}
+
+#[test]
+fn a_step_of_masses_on_springs_allocates_nothing() {
+    for response in [Response::Implicit, Response::Substepped] {
+        let mut world = resting_scene(Scheme::Auto, true);
+        world.set_desc(WorldDesc { response, ..world.desc().clone() }).unwrap();
+        let body = world.create_body(BodyDesc::default()).unwrap();
+        let links: Vec<LinkId> = (0..10)
+            .map(|index| {
+                let kind = if index == 0 { Kind::Fixed } else { Kind::PointMass };
+                let pose = Pose::at(0.1 * f64::from(index), 5.0, 0.0);
+                world.create_link(body, LinkDesc { kind, mass: 0.1, pose, ..LinkDesc::default() }).unwrap()
+            })
+            .collect();
+        let springs: Vec<_> = links
+            .windows(2)
+            .map(|pair| SpringDesc {
+                links: [pair[0], pair[1]],
+                rest_length: 0.1,
+                stiffness: 1e3,
+                damping: 1.0,
+                ..SpringDesc::default()
+            })
+            .collect();
+        world.create_springs(&springs).unwrap();
+        assert_eq!(allocations(world, 4), 0, "{response:?}");
+    }
 }
 
 /// Also where threads of the host help, as far as the thread that steps is concerned, and where all sleep.

@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use isocoat::capi::{body, buffer, draw, handle, link, math, motion, query, report, skeleton, world};
+use isocoat::capi::{body, buffer, draw, handle, link, math, motion, query, report, skeleton, spring, world};
 
 const WARNINGS: &[&str] =
     &["-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Wconversion", "-Wsign-conversion", "-Werror", "-O1", "-g"];
@@ -138,6 +138,7 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
         handle::isocoat_body { index, generation, world }
         handle::isocoat_link { index, generation, world }
         handle::isocoat_skeleton { index, generation, world }
+        handle::isocoat_spring { index, generation, world }
         math::isocoat_pose { position, orientation }
         math::isocoat_wrench { force, torque }
         motion::isocoat_link_state { pose, linear_velocity, angular_velocity }
@@ -159,6 +160,10 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
         skeleton::isocoat_skeleton_desc {
             struct_size, shape, points, thickness, stiffness, stiffening, radius, seed_count, user_data,
         }
+        spring::isocoat_spring_desc {
+            struct_size, reserved, links, points, rest_length, stiffness, damping, user_data,
+        }
+        spring::isocoat_spring_state { length, rate, tension, energy }
         report::isocoat_contact {
             body_a, body_b, link_a, link_b, skeleton_a, skeleton_b, position, normal, force, torque, area,
             peak_pressure, stiffness, error_estimate, evaluations, scheme, overloaded, reserved,

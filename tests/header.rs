@@ -18,6 +18,7 @@ const SECTIONS: &[(&str, &str)] = &[
     ("body", "Bodies"),
     ("link", "Links"),
     ("skeleton", "Skeletons"),
+    ("spring", "Springs"),
     ("motion", "Motion of one link"),
     ("buffer", "Bulk calls"),
     ("bulk", ""),

@@ -14,7 +14,7 @@ use common::{Coat, DT, G, Random, ball_inertia, box_inertia};
 use isocoat::base::Kind;
 use isocoat::field::Shape;
 use isocoat::math::{Mat3, Pose, Twist, Vec3};
-use isocoat::world::{BodyDesc, LinkDesc, LinkState, Response, SkeletonDesc, World, WorldDesc};
+use isocoat::world::{BodyDesc, LinkDesc, LinkState, Response, SkeletonDesc, SpringDesc, World, WorldDesc};
 
 const RADIUS: f64 = 0.5;
 
@@ -128,15 +128,51 @@ fn mixed() -> World {
     world
 }
 
+/// Blocks of masses on springs, some that are solved implicitly and some in sub-steps, with a solid that hangs from each.
+fn sprung(blocks: usize) -> World {
+    let mut world = world(Response::Auto, 5e-2);
+    add_floor(&mut world);
+    for block in 0..blocks {
+        let body = world.create_body(rough()).unwrap();
+        let stiffness = if block % 2 == 0 { 2000.0 } else { 10.0 };
+        let mut links = Vec::new();
+        for index in 0..27usize {
+            let at = Vec3::new((index % 3) as f64, (index / 3 % 3) as f64, (index / 9) as f64) * 0.1;
+            let pose = Pose::at(at.x + 0.5 * block as f64, at.y, at.z + 0.03);
+            let kind = if index == 26 { Kind::Rigid } else { Kind::PointMass };
+            let link = LinkDesc { kind, mass: 0.05, inertia: ball_inertia(0.05, 0.03), pose, ..LinkDesc::default() };
+            let link = world.create_link(body, link).unwrap();
+            let coat = SkeletonDesc { thickness: 0.03, radius: 0.05, ..SkeletonDesc::default() };
+            world.create_skeleton(link, coat).unwrap();
+            links.push((link, at));
+        }
+        let mut springs = Vec::new();
+        for (index, (a, from)) in links.iter().enumerate() {
+            for (b, to) in &links[..index] {
+                let length = (to - from).norm();
+                if length < 0.18 {
+                    let mut spring = SpringDesc { links: [*b, *a], stiffness, damping: 0.01, ..SpringDesc::default() };
+                    spring.rest_length = length;
+                    spring.points[1].x = if index == 26 { 0.02 } else { 0.0 };
+                    springs.push(spring);
+                }
+            }
+        }
+        world.create_springs(&springs).unwrap();
+    }
+    world
+}
+
 type Scene = (&'static str, fn() -> World, usize);
 
 /// Name, world, steps.
-const SCENES: [Scene; 5] = [
+const SCENES: [Scene; 6] = [
     ("heap_of_27_balls", || heap(3), 20),
     ("heap_of_125_balls", || heap(5), 4),
     ("wall_of_28_boxes", || wall(7), 6),
     ("64_bouncing_balls", || bouncing(64), 20),
     ("mixed", mixed, 40),
+    ("sprung", || sprung(4), 20),
 ];
 
 /// FNV-1a over 64-bit words.

@@ -175,6 +175,16 @@ typedef struct isocoat_skeleton {
     uint16_t world;
 } isocoat_skeleton;
 
+/** Handle of a spring between two links of a body. The rules of isocoat_body hold. */
+typedef struct isocoat_spring {
+    /** Slot of the spring in its world. */
+    uint32_t index;
+    /** How often the slot was used; 0 only in the null handle. */
+    uint16_t generation;
+    /** Tag of the world; 0 only in the null handle. */
+    uint16_t world;
+} isocoat_spring;
+
 /* ---- Poses, wrenches, inertia ------------------------------------------------------------------------------------ */
 
 /** Position and orientation of a frame in the world. */
@@ -244,7 +254,7 @@ typedef uint32_t isocoat_response;
 
 /**
  * The library chooses for each group of bodies in contact: ISOCOAT_RESPONSE_IMPLICIT for what is constrained, held by
- * its host or stacked, ISOCOAT_RESPONSE_SUBSTEPPED for the rest.
+ * its host, stacked, or on stiff springs, ISOCOAT_RESPONSE_SUBSTEPPED for the rest.
  */
 #define ISOCOAT_RESPONSE_AUTO 0u
 /** One evaluation of the forces a step, at its beginning: for small steps only. */
@@ -584,10 +594,10 @@ isocoat_status isocoat_body_create(isocoat_world *world,
                                    isocoat_body *body);
 
 /**
- * Destroys a body with its links and skeletons.
+ * Destroys a body with its links, skeletons and springs.
  *
  * - world: not NULL.
- * - body: the body; its handle and those of its links and skeletons are stale afterwards.
+ * - body: the body; its handle and those of its links, skeletons and springs are stale afterwards.
  *
  * Errors: INVALID_HANDLE. Threads: changes the world.
  */
@@ -820,10 +830,10 @@ isocoat_status isocoat_link_create(isocoat_world *world,
                                    isocoat_link *link);
 
 /**
- * Destroys a link with its skeletons.
+ * Destroys a link with its skeletons and springs.
  *
  * - world: not NULL.
- * - link: the link; its handle and those of its skeletons are stale afterwards.
+ * - link: the link; its handle and those of its skeletons and springs are stale afterwards.
  *
  * Errors: INVALID_HANDLE. Threads: changes the world.
  */
@@ -858,7 +868,7 @@ isocoat_status isocoat_link_set_desc(isocoat_world *world,
                                      const isocoat_link_desc *desc);
 
 /**
- * Takes a link and its skeletons out of the simulation, or puts them back. New links are enabled.
+ * Takes a link with its skeletons and springs out of the simulation, or puts them back. New links are enabled.
  *
  * - world: not NULL.
  * - link: the link.
@@ -1100,6 +1110,170 @@ isocoat_status isocoat_skeleton_get_link(const isocoat_world *world,
                                          isocoat_skeleton skeleton,
                                          isocoat_link *link);
 
+/* ---- Springs ----------------------------------------------------------------------------------------------------- */
+
+/**
+ * A damped spring between points of two links of one body; a fixed or host-driven link is an anchor. It pulls with
+ * stiffness * (length - rest_length) + damping * (rate of lengthening) on both ends, along the line through them. Begin
+ * with isocoat_spring_desc_default().
+ */
+typedef struct isocoat_spring_desc {
+    /** Size of this struct in bytes, as the host knows it. */
+    uint32_t struct_size;
+    /** 0. */
+    uint32_t reserved;
+    /** The links that it joins: two of one body. Default null. */
+    isocoat_link links[2];
+    /** Where its ends are, each in the frame of its link, in m, finite; 0 on a point mass. Default 0. */
+    double points[2][3];
+    /** Length without force, in m, from 0 to 1e9; 0 is a spring that pulls its ends together. Default 0. */
+    double rest_length;
+    /** Force a metre of stretch, in N/m, from 0 to 1e18. Default 0. */
+    double stiffness;
+    /** Force a metre a second of lengthening, in N s/m, from 0 to 1e18. Default 0. */
+    double damping;
+    /** The host's own; given back, otherwise unused. Default NULL. */
+    void *user_data;
+} isocoat_spring_desc;
+
+/** What a spring does at the present poses and velocities of its links. */
+typedef struct isocoat_spring_state {
+    /** Distance of its ends, in m. */
+    double length;
+    /** How fast that grows, in m/s. */
+    double rate;
+    /** Pull on its ends, damping included; negative when it pushes them apart; in N. */
+    double tension;
+    /** Elastic energy, in J. */
+    double energy;
+} isocoat_spring_state;
+
+/**
+ * Fills a descriptor with its defaults; isocoat_spring_desc_default() calls it.
+ *
+ * - desc: receives at most size bytes, its struct_size among them; not NULL.
+ * - size: sizeof(isocoat_spring_desc) as the host was compiled.
+ *
+ * Errors: INVALID_ARGUMENT. Threads: any.
+ */
+isocoat_status isocoat_spring_desc_init(isocoat_spring_desc *desc, size_t size);
+
+/**
+ * Creates a spring. A body is solved implicitly, unless another response is asked for, when one of its springs is stiff
+ * for the step: stiffness * dt^2 * (1 / mass_a + 1 / mass_b) > 0.09.
+ *
+ * - world: not NULL.
+ * - desc: the spring; not NULL.
+ * - spring: receives the handle; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE, UNSUPPORTED (links of two bodies, or one link twice),
+ * CAPACITY. Threads: changes the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_spring_create(isocoat_world *world,
+                                     const isocoat_spring_desc *desc,
+                                     isocoat_spring *spring);
+
+/**
+ * Creates many springs: all of them, or none if one is refused.
+ *
+ * - world: not NULL.
+ * - descs: count springs in a row, all of the struct_size of the first; not NULL unless count is 0.
+ * - count: number of springs.
+ * - springs: receives count handles; NULL when they are not wanted.
+ *
+ * Errors: as isocoat_spring_create; the message says which element. Threads: changes the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_spring_create_many(isocoat_world *world,
+                                          const isocoat_spring_desc *descs,
+                                          size_t count,
+                                          isocoat_spring *springs);
+
+/**
+ * Destroys a spring. One whose link is destroyed goes with it.
+ *
+ * - world: not NULL.
+ * - spring: the spring.
+ *
+ * Errors: INVALID_HANDLE. Threads: changes the world.
+ */
+ISOCOAT_MUST_USE isocoat_status isocoat_spring_destroy(isocoat_world *world, isocoat_spring spring);
+
+/**
+ * The descriptor of a spring.
+ *
+ * - world: not NULL.
+ * - spring: the spring.
+ * - desc: receives it; not NULL, with struct_size set.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_spring_get_desc(const isocoat_world *world,
+                                       isocoat_spring spring,
+                                       isocoat_spring_desc *desc);
+
+/**
+ * Changes a spring, from the next step on. Its links may change within its body.
+ *
+ * - world: not NULL.
+ * - spring: the spring.
+ * - desc: the new descriptor, whole; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE, UNSUPPORTED. Threads: changes the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_spring_set_desc(isocoat_world *world,
+                                       isocoat_spring spring,
+                                       const isocoat_spring_desc *desc);
+
+/**
+ * Length, tension and energy of a spring at the present poses and velocities of its links.
+ *
+ * - world: not NULL.
+ * - spring: the spring.
+ * - state: receives them; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_spring_get_state(const isocoat_world *world,
+                                        isocoat_spring spring,
+                                        isocoat_spring_state *state);
+
+/**
+ * The host's own pointer of a spring.
+ *
+ * - world: not NULL.
+ * - spring: the spring.
+ * - user_data: receives the pointer; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_spring_get_user_data(const isocoat_world *world,
+                                            isocoat_spring spring,
+                                            void **user_data);
+
+/**
+ * The springs of a body, in the order of their creation.
+ *
+ * - world: not NULL.
+ * - body: the body.
+ * - springs: receives the handles; NULL with capacity 0 asks for the count only.
+ * - capacity: handles that springs can hold.
+ * - count: receives the number of springs, also when springs is too small; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, BUFFER_TOO_SMALL. Threads: reads the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_body_get_springs(const isocoat_world *world,
+                                        isocoat_body body,
+                                        isocoat_spring *springs,
+                                        size_t capacity,
+                                        size_t *count);
+
 /* ---- Motion of one link ------------------------------------------------------------------------------------------ */
 
 /** Position, orientation and velocities of a link. */
@@ -1157,7 +1331,8 @@ isocoat_status isocoat_link_teleport(isocoat_world *world,
                                      const isocoat_link_state *state);
 
 /**
- * Mean contact force and torque on a link over the last step, about its centre of mass; 0 before the first step.
+ * Mean force and torque of contacts and springs on a link over the last step, about its centre of mass; 0 before the
+ * first step. Over a body without anchors those of its springs add up to nothing.
  *
  * - world: not NULL.
  * - link: the link, of any kind.
@@ -1336,7 +1511,8 @@ isocoat_status isocoat_world_get_link_states(const isocoat_world *world,
                                              isocoat_buffer orientations);
 
 /**
- * Mean contact forces and torques on many links over the last step, as isocoat_link_get_wrench gives them.
+ * Mean forces and torques of contacts and springs on many links over the last step, as isocoat_link_get_wrench gives
+ * them.
  *
  * - world: not NULL.
  * - links: count handles; not NULL unless count is 0.
@@ -1655,8 +1831,9 @@ isocoat_status isocoat_world_snapshot(const isocoat_world *world,
  *
  * Handles: in the world that took the snapshot, those taken before it are valid again, and those of what was created
  * after it are stale for ever. In any other world, of another process too, the snapshot's objects take the place of
- * all there was, and every handle given out so far is invalid; isocoat_world_get_bodies, isocoat_body_get_links and
- * isocoat_link_get_skeletons give the new ones. Their index and generation are those in the world that took it.
+ * all there was, and every handle given out so far is invalid; isocoat_world_get_bodies, isocoat_body_get_links,
+ * isocoat_body_get_springs and isocoat_link_get_skeletons give the new ones. Their index and generation are those in
+ * the world that took it.
  *
  * Errors: SNAPSHOT for what is damaged, cut short, of another format, or of a state that no world can be in, such as
  * one with a number that is none; the world is then as it was. Threads: changes the world.
@@ -1933,6 +2110,13 @@ static inline isocoat_skeleton_desc isocoat_skeleton_desc_default(void)
     return desc;
 }
 
+static inline isocoat_spring_desc isocoat_spring_desc_default(void)
+{
+    isocoat_spring_desc desc;
+    isocoat_spring_desc_init(&desc, sizeof desc);
+    return desc;
+}
+
 static inline isocoat_counters isocoat_counters_default(void)
 {
     isocoat_counters counters;
@@ -1977,6 +2161,8 @@ ISOCOAT_MUST_USE static inline isocoat_status isocoat_check_abi(void)
         (uint32_t)sizeof(isocoat_surface_point),
         (uint32_t)sizeof(isocoat_debug_draw),
         (uint32_t)sizeof(isocoat_times),
+        (uint32_t)sizeof(isocoat_spring_desc),
+        (uint32_t)sizeof(isocoat_spring_state),
     };
     return isocoat_check_abi_of(ISOCOAT_VERSION, sizes, sizeof sizes / sizeof sizes[0]);
 }

@@ -10,7 +10,7 @@
  *     world.step(1.0 / 60.0);
  *     for (const isocoat::contact &contact : world.contacts()) { ... }
  *
- * A world owns; body, link and skeleton are values that name something in it, as the C handles do: copying one copies
+ * A world owns; body, link, skeleton and spring are values that name something in it, as the C handles do: copying one copies
  * no body, and dropping one destroys nothing. A call that fails throws isocoat::error and has changed nothing.
  */
 #ifndef ISOCOAT_HPP
@@ -39,6 +39,7 @@ using mat3 = std::array<double, 9>; /* row by row */
 using pose = isocoat_pose;
 using wrench = isocoat_wrench;
 using link_state = isocoat_link_state;
+using spring_state = isocoat_spring_state;
 using contact = isocoat_contact;
 using event = isocoat_event;
 using counters = isocoat_counters;
@@ -129,7 +130,7 @@ std::vector<Named> name(isocoat_world *world, const std::vector<Raw> &raw)
     return named;
 }
 
-/* What the three nouns share: a world and a handle. */
+/* What the nouns share: a world and a handle. */
 template <class Raw>
 class noun {
 public:
@@ -257,6 +258,22 @@ public:
     }
 };
 
+/* A damped spring between two links of one body. */
+class spring : public detail::noun<isocoat_spring> {
+public:
+    using noun::noun;
+
+    void destroy() { check(isocoat_spring_destroy(world_, raw_)); }
+    isocoat_spring_desc desc() const
+    {
+        return detail::read(isocoat_spring_desc_default(), isocoat_spring_get_desc, world_, raw_);
+    }
+    void set_desc(const isocoat_spring_desc &desc) { check(isocoat_spring_set_desc(world_, raw_, &desc)); }
+    void *user_data() const { return detail::read<void *>(nullptr, isocoat_spring_get_user_data, world_, raw_); }
+    /* Length, tension and energy at the present poses and velocities of its links. */
+    spring_state state() const { return detail::read(spring_state{}, isocoat_spring_get_state, world_, raw_); }
+};
+
 /* One deformable or rigid object: a base of links, and a coat. */
 class body : public detail::noun<isocoat_body> {
 public:
@@ -281,6 +298,12 @@ public:
     {
         return detail::name<link>(world_, detail::list<isocoat_link>([this](auto... list) {
             return isocoat_body_get_links(world_, raw_, list...);
+        }));
+    }
+    std::vector<spring> springs() const
+    {
+        return detail::name<spring>(world_, detail::list<isocoat_spring>([this](auto... list) {
+            return isocoat_body_get_springs(world_, raw_, list...);
         }));
     }
 
@@ -321,7 +344,8 @@ inline body link::parent() const
     return {world_, detail::read(isocoat_body{}, isocoat_link_get_body, world_, raw_)};
 }
 
-/* Owns everything. Movable, not copyable; bodies, links and skeletons stay valid when their world is moved. */
+/* Owns everything. Movable, not copyable; bodies, links, skeletons and springs stay valid when their
+ * world is moved. */
 class world {
 public:
     using log_function = std::function<void(isocoat_log_level, const char *)>;
@@ -350,6 +374,19 @@ public:
     body create_body(const isocoat_body_desc &desc = isocoat_body_desc_default())
     {
         return {get(), detail::read(isocoat_body{}, isocoat_body_create, get(), &desc)};
+    }
+
+    /* A spring between two links of one body, which the descriptor names. */
+    spring create_spring(const isocoat_spring_desc &desc)
+    {
+        return {get(), detail::read(isocoat_spring{}, isocoat_spring_create, get(), &desc)};
+    }
+    /* Many of them: all, or none if one is refused. */
+    std::vector<spring> create_springs(span<const isocoat_spring_desc> descs)
+    {
+        std::vector<isocoat_spring> made(descs.size());
+        check(isocoat_spring_create_many(get(), descs.data(), descs.size(), made.data()));
+        return detail::name<spring>(get(), made);
     }
 
     /* All bodies, in the order of their slots. */

@@ -43,15 +43,15 @@ pub struct Motion {
     pub local_center: Vec3,
     /// Velocities.
     pub twist: Twist,
-    /// Acceleration of everything but contact \[m/s²\].
+    /// Acceleration of everything but contacts and springs \[m/s²\].
     pub acceleration: Vec3,
-    /// Angular acceleration of everything but contact and gyroscopic terms \[rad/s²\].
+    /// Angular acceleration of everything but contacts, springs and gyroscopic terms \[rad/s²\].
     pub angular_acceleration: Vec3,
     /// Answer to impulses.
     pub inertia: Inertia,
-    /// Contact impulses so far, about the centre of mass.
+    /// Impulses of contacts and springs so far, about the centre of mass.
     pub contact_impulse: Wrench,
-    /// A contact pushed it.
+    /// A contact or a spring pushed it.
     pub touched: bool,
 }
 
@@ -104,7 +104,7 @@ impl Motion {
         self.twist.angular = *inverse * momentum;
     }
 
-    /// Adds the velocity that everything but contact brings in `h` seconds.
+    /// Adds the velocity that everything but contacts and springs brings in `h` seconds.
     pub fn kick(&mut self, h: f64) {
         if self.is_movable() {
             self.twist.linear += self.acceleration * h;
@@ -131,7 +131,7 @@ impl Motion {
         }
     }
 
-    /// Takes a contact impulse about the centre of mass.
+    /// Takes the impulse of a contact or a spring about the centre of mass.
     pub fn push(&mut self, impulse: &Wrench) {
         self.contact_impulse.add_scaled(impulse, 1.0);
         self.touched = true;

@@ -192,10 +192,10 @@ pub unsafe extern "C" fn isocoat_body_create(
     }
 }
 
-/// Destroys a body with its links and skeletons.
+/// Destroys a body with its links, skeletons and springs.
 ///
 /// - world: not NULL.
-/// - body: the body; its handle and those of its links and skeletons are stale afterwards.
+/// - body: the body; its handle and those of its links, skeletons and springs are stale afterwards.
 ///
 /// Errors: INVALID_HANDLE. Threads: changes the world.
 #[must_use]

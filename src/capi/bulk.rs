@@ -122,7 +122,8 @@ unsafe fn get_wrenches(
     }
 }
 
-/// Mean contact forces and torques on many links over the last step, as isocoat_link_get_wrench gives them.
+/// Mean forces and torques of contacts and springs on many links over the last step, as isocoat_link_get_wrench gives
+/// them.
 ///
 /// - world: not NULL.
 /// - links: count handles; not NULL unless count is 0.

@@ -85,6 +85,35 @@ pub(super) unsafe fn read<T: Descriptor>(pointer: *const T, name: &str) -> Check
     })
 }
 
+/// Reads a row of structs, each of the size that the first one says.
+///
+/// # Safety
+/// `first` is NULL or points to `count` structs in a row, of the size that they say.
+pub(super) unsafe fn read_row<T: Descriptor>(first: *const T, count: usize, name: &str) -> Checked<Vec<T>> {
+    if count == 0 {
+        return Ok(Vec::new());
+    }
+    // SAFETY: the caller's promise.
+    let size = unsafe { size_at(first, name) }?;
+    if count.checked_mul(size).is_none_or(|bytes| bytes > isize::MAX as usize) {
+        return Err(Refusal::argument(format!("the count of {name} is {count}: no memory is that large")));
+    }
+    let mut row = Vec::with_capacity(count);
+    for index in 0..count {
+        let at = first.wrapping_byte_add(index * size);
+        // SAFETY: within the row.
+        let own = unsafe { size_at(at, name) }.map_err(|refusal| refusal.at(name, index))?;
+        if own != size {
+            return Err(Refusal::argument(format!(
+                "{name}[{index}].struct_size is {own}; must be {size}, as the first's"
+            )));
+        }
+        // SAFETY: likewise, and of its size.
+        row.push(unsafe { read(at, name) }.map_err(|refusal| refusal.at(name, index))?);
+    }
+    Ok(row)
+}
+
 /// Where a struct goes: its size is checked before the work.
 pub(super) struct OutStruct<T> {
     pointer: *mut T,

@@ -217,10 +217,10 @@ pub unsafe extern "C" fn isocoat_link_create(
     }
 }
 
-/// Destroys a link with its skeletons.
+/// Destroys a link with its skeletons and springs.
 ///
 /// - world: not NULL.
-/// - link: the link; its handle and those of its skeletons are stale afterwards.
+/// - link: the link; its handle and those of its skeletons and springs are stale afterwards.
 ///
 /// Errors: INVALID_HANDLE. Threads: changes the world.
 #[must_use]
@@ -277,7 +277,7 @@ pub unsafe extern "C" fn isocoat_link_set_desc(
     }
 }
 
-/// Takes a link and its skeletons out of the simulation, or puts them back. New links are enabled.
+/// Takes a link with its skeletons and springs out of the simulation, or puts them back. New links are enabled.
 ///
 /// - world: not NULL.
 /// - link: the link.

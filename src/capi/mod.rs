@@ -2,8 +2,8 @@
 //!
 //! Mechanism and nouns are apart. Mechanism: [`status`] (codes, messages), [`version`], [`guard`] (panics, locks),
 //! [`mod@pointer`] and [`descriptor`] (memory of the host), [`handle`], [`buffer`]. Nouns: [`world`], [`body`],
-//! [`link`], [`skeleton`], [`math`], and what is done with them: [`motion`], [`bulk`], [`report`], [`snapshot`], [`query`],
-//! [`draw`], [`tasks`].
+//! [`link`], [`skeleton`], [`spring`], [`math`], and what is done with them: [`motion`], [`bulk`], [`report`],
+//! [`snapshot`], [`query`], [`draw`], [`tasks`].
 //!
 //! Nothing here computes: every function checks the host's pointers, translates, calls the public Rust API, and
 //! translates back. The comments are the manual that goes into the header.
@@ -26,6 +26,7 @@ pub mod query;
 pub mod report;
 pub mod skeleton;
 pub mod snapshot;
+pub mod spring;
 pub mod status;
 pub mod tasks;
 pub mod version;

@@ -109,7 +109,8 @@ pub unsafe extern "C" fn isocoat_link_teleport(
     }
 }
 
-/// Mean contact force and torque on a link over the last step, about its centre of mass; 0 before the first step.
+/// Mean force and torque of contacts and springs on a link over the last step, about its centre of mass; 0 before the
+/// first step. Over a body without anchors those of its springs add up to nothing.
 ///
 /// - world: not NULL.
 /// - link: the link, of any kind.

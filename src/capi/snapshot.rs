@@ -46,8 +46,9 @@ pub unsafe extern "C" fn isocoat_world_snapshot(
 ///
 /// Handles: in the world that took the snapshot, those taken before it are valid again, and those of what was created
 /// after it are stale for ever. In any other world, of another process too, the snapshot's objects take the place of
-/// all there was, and every handle given out so far is invalid; isocoat_world_get_bodies, isocoat_body_get_links and
-/// isocoat_link_get_skeletons give the new ones. Their index and generation are those in the world that took it.
+/// all there was, and every handle given out so far is invalid; isocoat_world_get_bodies, isocoat_body_get_links,
+/// isocoat_body_get_springs and isocoat_link_get_skeletons give the new ones. Their index and generation are those in
+/// the world that took it.
 ///
 /// Errors: SNAPSHOT for what is damaged, cut short, of another format, or of a state that no world can be in, such as
 /// one with a number that is none; the world is then as it was. Threads: changes the world.

@@ -74,6 +74,8 @@ const LAYOUTS: &[Layout] = &[
     fixed::<super::query::isocoat_surface_point>("isocoat_surface_point"),
     growable::<super::draw::isocoat_debug_draw>(),
     growable::<super::report::isocoat_times>(),
+    growable::<super::spring::isocoat_spring_desc>(),
+    fixed::<super::spring::isocoat_spring_state>("isocoat_spring_state"),
 ];
 
 /// What isocoat_check_abi calls: compares a host's version and struct sizes with the library's.

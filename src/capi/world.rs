@@ -14,7 +14,7 @@ use crate::world::{BodyId, LogLevel, Response, Scheme, World, WorldDesc};
 /// How contact forces act on the links in time: an ISOCOAT_RESPONSE_ value.
 pub type isocoat_response = u32;
 /// The library chooses for each group of bodies in contact: ISOCOAT_RESPONSE_IMPLICIT for what is constrained, held by
-/// its host or stacked, ISOCOAT_RESPONSE_SUBSTEPPED for the rest.
+/// its host, stacked, or on stiff springs, ISOCOAT_RESPONSE_SUBSTEPPED for the rest.
 pub const ISOCOAT_RESPONSE_AUTO: isocoat_response = 0;
 /// One evaluation of the forces a step, at its beginning: for small steps only.
 pub const ISOCOAT_RESPONSE_EXPLICIT: isocoat_response = 1;

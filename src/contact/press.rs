@@ -4,6 +4,7 @@
 use super::pair::{Pair, Side};
 use super::patch::{self, Node, Sums};
 use crate::base::Motion;
+use crate::field::Placed;
 use crate::math::{Vec3, Wrench};
 
 /// How the surfaces of two bodies rub and damp.
@@ -53,15 +54,26 @@ fn share(side: &Side, position: &Vec3, out: &mut Vec<Share>) {
     let mut total = 0.0;
     for (skeleton, link) in side.skeletons.iter().zip(&side.links) {
         let weight = skeleton.value(position);
+        if weight <= 0.0 {
+            continue;
+        }
         total += weight;
         match out.iter_mut().find(|share| share.link == *link) {
             Some(share) => share.weight += weight,
             None => out.push(Share { link: *link, weight }),
         }
     }
-    for share in out.iter_mut() {
-        share.weight /= total;
+    if total > 0.0 {
+        for share in out.iter_mut() {
+            share.weight /= total;
+        }
+        return;
     }
+    // Where no field reaches, as in the middle of a gap, the closest skeleton's link carries what is there.
+    let distance = |skeleton: &Placed| skeleton.shape.closest(position).distance;
+    let closest = side.skeletons.iter().zip(&side.links).min_by(|a, b| distance(a.0).total_cmp(&distance(b.0)));
+    out.clear();
+    out.extend(closest.map(|(_, link)| Share { link: *link, weight: 1.0 }));
 }
 
 impl Carriers {

@@ -11,6 +11,7 @@ use nalgebra::{Matrix6, Vector6};
 use super::conjugate::Blocks;
 use super::envelope::{BLOCK, Envelope};
 use super::grouping::Bundle;
+use super::springs::Tie;
 use crate::base::{Inertia, Motion};
 use crate::contact::press::Material;
 use crate::math::{Mat3, Quat, Twist, Vec3, Wrench, rotate_tensor};
@@ -175,7 +176,9 @@ pub struct Coupled {
     pub groups: Vec<Group>,
     /// Points of all groups.
     pub points: Vec<Point>,
-    /// Members of all groups.
+    /// Springs.
+    pub ties: Vec<Tie>,
+    /// Members of all groups, then of all ties.
     pub members: Vec<Member>,
     masses: Vec<Matrix6<f64>>,
     mobilities: Vec<Matrix6<f64>>,
@@ -185,9 +188,9 @@ pub struct Coupled {
     wide: bool,
     matrix: Envelope,
     blocks_of_matrix: Blocks,
-    /// Each group's part of the system.
+    /// The part of each group, then of each tie, in the system.
     parts: Vec<Part>,
-    /// The members that are each row of blocks, in the order of the groups, and where each row's begin.
+    /// The members that are each row of blocks, in the order of the parts, and where each row's begin.
     roles: Vec<Role>,
     starts: Vec<u32>,
     /// The blocks off the diagonal, row by row.
@@ -198,29 +201,31 @@ pub struct Coupled {
     step: Vec<f64>,
 }
 
-/// A group's part of the system.
+/// The part of a group or a tie in the system.
 #[derive(Clone, Copy, Debug, Default)]
 struct Part {
     /// On b, about the group's centre.
     push: Push,
     slope: Slope,
+    /// The slope is more than nothing.
+    resists: bool,
 }
 
-/// A group in which a row's link takes part.
+/// A group or a tie in which a row's link takes part.
 #[derive(Clone, Copy, Debug, Default)]
 struct Role {
-    group: u32,
+    part: u32,
     member: u32,
 }
 
-/// How a member of a group answers to another.
+/// How a member of a group or a tie answers to another.
 #[derive(Clone, Copy, Debug)]
 struct Coupling {
-    group: u32,
+    part: u32,
     members: [u32; 2],
 }
 
-/// Least groups, rows and blocks that a worker takes in one go.
+/// Least parts, rows and blocks that a worker takes in one go.
 const GROUPS: usize = 16;
 
 /// Steps of Newton's method in one solve.
@@ -234,6 +239,9 @@ const FLAT: f64 = 0.2;
 
 /// Residual over the kinetic energy at work, both squared, at which nothing is left to solve.
 const SOLVED: f64 = 1e-18;
+
+/// The same with springs: what the residual leaves is a velocity, which stretches a stiff one.
+const SOLVED_TIES: f64 = 1e-26;
 
 /// Part of its size in the last step to which a residual's square must have fallen for the next step to be made with the
 /// same matrix.
@@ -266,10 +274,11 @@ impl Coupled {
         }
     }
 
-    /// Forgets the groups.
+    /// Forgets groups and ties.
     pub fn clear(&mut self) {
         self.groups.clear();
         self.points.clear();
+        self.ties.clear();
         self.members.clear();
     }
 
@@ -290,14 +299,15 @@ impl Coupled {
     pub fn set_base(&mut self, x: &[f64], fixed: &[Motion], team: &Team) {
         let mut groups = std::mem::take(&mut self.groups);
         let block = team.share(groups.len(), GROUPS);
-        team.each_mut(&mut groups, block, |_, group| group.base = self.relative_of(group, x, fixed));
+        team.each_mut(&mut groups, block, |_, group| group.base = self.relative_of(group.members, x, fixed));
         self.groups = groups;
     }
 
-    /// Velocity of b's flesh relative to a's over a group, about its centre, for velocities `of` the links.
-    pub fn relative(&self, group: &Group, of: impl Fn(u32) -> Twist) -> Twist {
+    /// Velocity of b relative to a over the members of a group, about its centre, or of a tie, for velocities `of` the
+    /// links.
+    pub fn relative(&self, members: (usize, usize), of: impl Fn(u32) -> Twist) -> Twist {
         let mut sum = Twist::default();
-        for member in &self.members[group.members.0..group.members.1] {
+        for member in &self.members[members.0..members.1] {
             let twist = member.twist(&of(member.link));
             sum.linear += twist.linear * member.weight;
             sum.angular += twist.angular * member.weight;
@@ -305,12 +315,17 @@ impl Coupled {
         sum
     }
 
-    /// The relative velocity of a group for the unknowns `x`; `fixed` has the velocities of links without unknowns.
-    pub fn relative_of(&self, group: &Group, x: &[f64], fixed: &[Motion]) -> Twist {
-        self.relative(group, |link| match self.blocks[link as usize] {
+    /// The relative velocity over some members for the unknowns `x`; `fixed` has the velocities of links without unknowns.
+    pub fn relative_of(&self, members: (usize, usize), x: &[f64], fixed: &[Motion]) -> Twist {
+        self.relative(members, |link| match self.blocks[link as usize] {
             NONE => fixed[link as usize].twist,
             block => twist_of(x, block),
         })
+    }
+
+    /// The velocities of a link in the unknowns `x`, if it has any.
+    pub fn twist_in(&self, link: u32, x: &[f64]) -> Option<Twist> {
+        Some(self.blocks[link as usize]).filter(|block| *block != NONE).map(|block| twist_of(x, block))
     }
 
     /// What each group came to at the unknowns that [`solve`](Self::solve) found.
@@ -331,10 +346,12 @@ impl Coupled {
         self.assemble(x, free, fixed, h, true, team);
         let mut norm = self.norm(&self.residual);
         let scale = norm + self.energy(x) + self.energy(free);
-        if norm <= SOLVED * scale {
+        let (solved, enough) =
+            if self.ties.is_empty() { (SOLVED, accuracy * accuracy) } else { (SOLVED_TIES, SOLVED_TIES) };
+        if norm <= solved * scale {
             return true;
         }
-        let enough = accuracy * accuracy * scale;
+        let enough = enough * scale;
         let (mut last, mut fresh) = (f64::INFINITY, true);
         for _ in 0..MOST_STEPS {
             if !fresh && norm > QUICK * last {
@@ -428,17 +445,22 @@ impl Coupled {
 
     /// Who is coupled with whom, and the shape of the matrix.
     fn shape(&mut self) {
-        let Self { groups, members, blocks, roles, starts, couplings, first, .. } = self;
+        let Self { groups, ties, members, blocks, roles, starts, couplings, first, .. } = self;
+        let parts = groups.iter().map(|group| group.members).chain(ties.iter().map(|tie| tie.members));
         let count = self.masses.len();
         let block = |member: usize| blocks[members[member].link as usize];
-        let taking_part = |group: &Group| (group.members.0..group.members.1).filter(|member| block(*member) != NONE);
+        let taking_part = |(first, end): (usize, usize)| (first..end).filter(|member| block(*member) != NONE);
+        let members_of = |part: usize| match groups.get(part) {
+            Some(group) => group.members,
+            None => ties[part - groups.len()].members,
+        };
         first.clear();
         first.extend(0..count as u32);
         starts.clear();
         starts.resize(count + 2, 0);
-        for group in groups.iter() {
-            let lowest = taking_part(group).map(block).min().unwrap_or(NONE);
-            for row in taking_part(group).map(block) {
+        for part in parts.clone() {
+            let lowest = taking_part(part).map(block).min().unwrap_or(NONE);
+            for row in taking_part(part).map(block) {
                 first[row as usize] = lowest.min(first[row as usize]);
                 starts[row as usize + 2] += 1;
             }
@@ -448,11 +470,11 @@ impl Coupled {
         }
         roles.clear();
         roles.resize(starts[count + 1] as usize, Role::default());
-        for (index, group) in groups.iter().enumerate() {
-            for member in taking_part(group) {
+        for (index, part) in parts.enumerate() {
+            for member in taking_part(part) {
                 // Each row's start, kept one place up meanwhile, moves to the next one's.
                 let place = &mut starts[block(member) as usize + 1];
-                roles[*place as usize] = Role { group: index as u32, member: member as u32 };
+                roles[*place as usize] = Role { part: index as u32, member: member as u32 };
                 *place += 1;
             }
         }
@@ -465,10 +487,10 @@ impl Coupled {
         matrix.clear();
         for row in 0..count {
             for role in &roles[starts[row] as usize..starts[row + 1] as usize] {
-                for other in taking_part(&groups[role.group as usize]) {
+                for other in taking_part(members_of(role.part as usize)) {
                     // Of a factor the lower half.
                     if block(other) < row as u32 || wide && block(other) > row as u32 {
-                        couplings.push(Coupling { group: role.group, members: [role.member, other as u32] });
+                        couplings.push(Coupling { part: role.part, members: [role.member, other as u32] });
                         matrix.couple(block(other));
                     }
                 }
@@ -477,15 +499,24 @@ impl Coupled {
         }
     }
 
-    /// Residual `M (x - free) - h Σ forces` and its derivative. Each group, then each row and each block is worked out by
+    /// Residual `M (x - free) - h Σ forces` and its derivative. Each part, then each row and each block is worked out by
     /// one worker.
     fn assemble(&mut self, x: &[f64], free: &[f64], fixed: &[Motion], h: f64, with_matrix: bool, team: &Team) {
         let mut parts = std::mem::take(&mut self.parts);
-        parts.resize(self.groups.len(), Part::default());
-        team.each_mut(&mut parts, team.share(self.groups.len(), GROUPS), |index, part| {
-            let group = &self.groups[index];
-            let relative = self.relative_of(group, x, fixed);
-            part.push = self.respond(group, &relative, h, with_matrix.then_some(&mut part.slope));
+        let count = self.groups.len() + self.ties.len();
+        parts.resize(count, Part::default());
+        team.each_mut(&mut parts, team.share(count, GROUPS), |index, part| match self.groups.get(index) {
+            Some(group) => {
+                let relative = self.relative_of(group.members, x, fixed);
+                part.push = self.respond(group, &relative, h, with_matrix.then_some(&mut part.slope));
+                part.resists = part.push.all != Wrench::default();
+            }
+            None => {
+                let tie = &self.ties[index - self.groups.len()];
+                let (force, ll) = tie.respond(&self.relative_of(tie.members, x, fixed).linear, h);
+                part.push.all = Wrench { force, torque: Vec3::zeros() };
+                (part.slope, part.resists) = (Slope { ll, ..Slope::default() }, true);
+            }
         });
         self.parts = parts;
         let Self { parts, members, masses, roles, starts, couplings, diagonal, residual, .. } = self;
@@ -498,7 +529,7 @@ impl Coupled {
             let mut sum = masses[row] * change;
             for role in roles_of(row) {
                 let member = &members[role.member as usize];
-                let Wrench { force, torque } = member.wrench(&parts[role.group as usize].push.all);
+                let Wrench { force, torque } = member.wrench(&parts[role.part as usize].push.all);
                 sum -= Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z) * (h * member.weight);
             }
             residual.copy_from_slice(sum.as_slice());
@@ -512,8 +543,8 @@ impl Coupled {
             work_out(row, residual);
             let mut sum = masses[row];
             for role in roles_of(row) {
-                let (part, member) = (&parts[role.group as usize], &members[role.member as usize]);
-                if part.push.all != Wrench::default() {
+                let (part, member) = (&parts[role.part as usize], &members[role.member as usize]);
+                if part.resists {
                     sum += member.block(&part.slope, member) * h;
                 }
             }
@@ -521,10 +552,9 @@ impl Coupled {
         });
         let couplings = &*couplings;
         let block = |index: usize| {
-            let Coupling { group, members: [row, other] } = couplings[index];
-            let part = &parts[group as usize];
-            let nothing = part.push.all == Wrench::default();
-            (!nothing).then(|| members[row as usize].block(&part.slope, &members[other as usize]) * h)
+            let Coupling { part, members: [row, other] } = couplings[index];
+            let part = &parts[part as usize];
+            part.resists.then(|| members[row as usize].block(&part.slope, &members[other as usize]) * h)
         };
         if self.wide {
             let entries = self.blocks_of_matrix.entries();

@@ -1,4 +1,4 @@
-//! Implicit response: velocities and contact forces of a whole island that agree at the end of the step.
+//! Implicit response: velocities, contact forces and springs of a whole island that agree at the end of the step.
 //!
 //! Backward Euler with the contact surfaces evaluated at the end pose (docs/model.md, "Implicit response"). The
 //! velocities start as they were, with what would carry bodies into each other taken away; then, in turn, the surfaces
@@ -9,6 +9,7 @@
 use super::coupled::{Coupled, Group, Member, Point, Push, put_twist, twist_of};
 use super::envelope::{BLOCK, OrderBuffers, narrow_order};
 use super::grouping::{Bundle, CREEP, Grouping, RECOVERY, combinations, thicknesses, thinner};
+use super::springs::{self, Tie};
 use super::substep::{Island, Step, bend_bristles, drift};
 use crate::base::Motion;
 use crate::clock::Clock;
@@ -135,7 +136,7 @@ impl Nearby {
 /// Advances an island by `dt`.
 pub fn step(step: &mut Step, dt: f64, effort: &Effort, solver: &mut Solver) {
     (solver.rounds, solver.splits) = (0, 0);
-    if step.island.candidates.is_empty() {
+    if step.island.candidates.is_empty() && step.island.springs.is_empty() {
         fly(step.motions, step.island, dt);
         return;
     }
@@ -172,15 +173,20 @@ impl Solver {
         nodes.extend(island.links.iter().filter(|link| motions[**link as usize].is_movable()));
         nodes.sort_unstable();
         edges.clear();
+        let place = |link: &u32| nodes.binary_search(link).ok().map(|place| place as u32);
         for index in &island.candidates {
             let pair = &candidates[*index as usize].pair;
-            let place = |link: &u32| nodes.binary_search(link).ok().map(|place| place as u32);
             for a in pair.a.links.iter().filter_map(place) {
                 for b in pair.b.links.iter().filter_map(place) {
                     if a != b {
                         edges.push((a.min(b), a.max(b)));
                     }
                 }
+            }
+        }
+        for [a, b] in island.springs.iter().map(|spring| spring.links) {
+            if let (Some(a), Some(b)) = (place(&a), place(&b)) {
+                edges.push((a.min(b), a.max(b)));
             }
         }
         edges.sort_unstable();
@@ -208,6 +214,7 @@ impl Solver {
         clock.lap(&mut step.work.solve_time);
         // Nearly all that contacts can do is to take away what makes the free motion differ.
         self.reach = RUSH * h * self.change(&self.free);
+        let nobody_near = step.island.candidates.is_empty();
         let mut converged = false;
         for _ in 0..effort.rounds {
             self.rounds += 1;
@@ -217,8 +224,9 @@ impl Solver {
             let solved =
                 self.coupled.solve(&mut self.x, &self.free, step.motions, h, ACCURACY * effort.tolerance, step.team);
             let closed = 2.0 * h * self.change(&self.looked);
-            converged =
-                solved && closed <= self.reach && self.agrees(step.motions, step.candidates, h, effort.tolerance);
+            converged = solved
+                && (closed <= self.reach || nobody_near)
+                && self.agrees(step.motions, step.candidates, h, effort.tolerance);
             self.reach = self.reach.max(RUSH * closed);
             clock.lap(&mut step.work.solve_time);
             if !solved || converged {
@@ -340,7 +348,7 @@ impl Solver {
         work.look(&self.trial, island, candidates, settings, true, team);
     }
 
-    /// Puts the contact surfaces into the system; as a `last_resort`, frozen where they are.
+    /// Puts contact surfaces and springs into the system; as a `last_resort`, the surfaces frozen where they are.
     fn couple_all(&mut self, step: &Step, h: f64, last_resort: bool) {
         self.coupled.clear();
         let Step { motions, island, candidates, team, .. } = step;
@@ -358,15 +366,20 @@ impl Solver {
             self.coupled.append(bundle);
         }
         self.coupled.set_base(&self.x, motions, team);
+        for spring in &island.springs {
+            let mut tie = Tie::new(spring, trial, &mut self.coupled.members);
+            tie.set_velocity(&self.coupled.relative_of(tie.members, &self.x, motions).linear);
+            self.coupled.ties.push(tie);
+        }
     }
 
     /// Whether the contacts moved so little since they were evaluated that they are still what they were.
     fn agrees(&self, motions: &[Motion], candidates: &[Kept], h: f64, tolerance: f64) -> bool {
-        self.coupled.groups.iter().all(|group| {
-            let now = self.coupled.relative_of(group, &self.x, motions);
+        let groups = self.coupled.groups.iter().all(|group| {
+            let now = self.coupled.relative_of(group.members, &self.x, motions);
             let change = Twist { linear: now.linear - group.base.linear, angular: now.angular - group.base.angular };
             let pair = &candidates[group.candidate as usize];
-            let speed = self.speed(group, motions, h);
+            let speed = self.speed(group.members, motions, h);
             let Some(patch) = group.patch else {
                 // A wall or a gap is exact, until it begins to push where it did not.
                 let point = &self.coupled.points[group.points.0];
@@ -383,7 +396,20 @@ impl Solver {
             let along = change.linear - patch.normal * change.linear.dot(&patch.normal);
             let across = change.linear.dot(&patch.normal).abs() + change.angular.norm() * size;
             h * across <= tolerance * depth && h * along.norm() <= tolerance * size
-        })
+        });
+        groups && self.coupled.ties.iter().all(|tie| self.tie_agrees(tie, motions, h, tolerance))
+    }
+
+    /// Whether a tie's ends came where the system took them to be. In a turn they go round, and not straight on.
+    fn tie_agrees(&self, tie: &Tie, motions: &[Motion], h: f64, tolerance: f64) -> bool {
+        let turned = |member: &Member| {
+            let turn = |x| self.coupled.twist_in(member.link, x).map_or_else(Vec3::zeros, |twist| twist.angular);
+            if member.turns { (turn(&self.x) - turn(&self.looked)).norm_squared() * h * member.arm.norm() } else { 0.0 }
+        };
+        let off = self.coupled.members[tie.members.0..tie.members.1].iter().map(turned).sum::<f64>();
+        let velocity = self.coupled.relative_of(tie.members, &self.x, motions).linear;
+        h * off <= tolerance * tie.stretch(&velocity, h).abs()
+            || off <= NEGLIGIBLE * self.speed(tie.members, motions, h)
     }
 
     /// Half the width of a group's patch.
@@ -392,9 +418,9 @@ impl Solver {
         (points.iter().map(|point| point.area).sum::<f64>() / std::f64::consts::PI).sqrt()
     }
 
-    /// The speeds that are at work in a group in this step.
-    fn speed(&self, group: &Group, motions: &[Motion], h: f64) -> f64 {
-        let members = &self.coupled.members[group.members.0..group.members.1];
+    /// The speeds that are at work among some members in this step.
+    fn speed(&self, (first, end): (usize, usize), motions: &[Motion], h: f64) -> f64 {
+        let members = &self.coupled.members[first..end];
         let speed = |member: &Member| {
             let motion = &motions[member.link as usize];
             motion.acceleration.norm() * h + NEGLIGIBLE * motion.twist.at(&member.arm).norm()
@@ -414,7 +440,8 @@ impl Solver {
                 candidate.memory.touched = true;
             }
         }
-        if self.coupled.pushes().all(|(_, push)| push.all == Wrench::default()) {
+        let untouched = self.coupled.pushes().all(|(_, push)| push.all == Wrench::default());
+        if untouched && island.springs.is_empty() {
             fly(motions, island, h);
             return;
         }
@@ -430,6 +457,14 @@ impl Solver {
                 }
             }
         }
+        for tie in &self.coupled.ties {
+            let velocity = self.coupled.relative_of(tie.members, &self.x, &self.trial).linear;
+            let (force, _) = tie.respond(&velocity, h);
+            for member in &self.coupled.members[tie.members.0..tie.members.1] {
+                let force = force * (h * member.weight);
+                motions[member.link as usize].push(&Wrench { force, torque: member.arm.cross(&force) });
+            }
+        }
         let same = |a: &Group, b: &Group| (a.candidate, a.patch) == (b.candidate, b.patch);
         let mut first = 0;
         for groups in self.coupled.groups.chunk_by(same) {
@@ -442,6 +477,12 @@ impl Solver {
             candidate.loads[patch as usize] = sums;
         }
         drift(motions, island, h);
+        if let Some(fall) = springs::fall_as_one(&island.springs, &island.links, motions).filter(|_| untouched) {
+            for link in &island.links {
+                let motion = &mut motions[*link as usize];
+                motion.center -= if motion.is_movable() { fall * (0.5 * h * h) } else { Vec3::zeros() };
+            }
+        }
         for index in &island.candidates {
             let candidate = &mut candidates[*index as usize];
             if candidate.material.static_friction > 0.0 {

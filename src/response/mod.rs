@@ -1,4 +1,4 @@
-//! Response: how contact forces move links.
+//! Response: how contacts and springs move links.
 
 pub mod conjugate;
 pub mod coupled;
@@ -7,14 +7,15 @@ pub mod explicit;
 pub mod grouping;
 pub mod implicit;
 pub mod mirror;
+pub mod springs;
 pub mod substep;
 pub mod substepped;
 
 /// How contact forces act on the links in time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Response {
-    /// The library chooses for each island: [`Response::Implicit`] for what is constrained, held by its host or
-    /// stacked, [`Response::Substepped`] for the rest.
+    /// The library chooses for each island: [`Response::Implicit`] for what is constrained, held by its host, stacked,
+    /// or on stiff springs, [`Response::Substepped`] for the rest.
     #[default]
     Auto,
     /// One force evaluation a step, at the pose of its beginning.

@@ -1,6 +1,7 @@
 //! One sub-step: drift, evaluate the contact surfaces, kick, drift. Symplectic, of second order, with one evaluation.
 
-use crate::base::Motion;
+use super::springs;
+use crate::base::{Motion, Spring};
 use crate::clock::Clock;
 use crate::contact::candidate::{Candidate, Kept};
 use crate::contact::friction;
@@ -22,6 +23,8 @@ pub struct Island {
     pub links: Vec<u32>,
     /// Positions in a list of candidates, in ascending order.
     pub candidates: Vec<u32>,
+    /// Springs between the links.
+    pub springs: Vec<Spring>,
 }
 
 /// Candidates that a worker looks at in one go.
@@ -95,14 +98,17 @@ impl Step<'_> {
                 bend_bristles(candidate, motions, h, &mut work.carriers);
             }
         }
+        springs::damp(island.springs.iter(), motions, 0.5 * h);
         for link in &island.links {
             motions[*link as usize].kick(h);
         }
+        springs::kick(&island.springs, motions, h);
         work.grips.clear();
         for index in &island.candidates {
             press_candidate(&mut candidates[*index as usize], *index as usize, motions, h, work);
         }
         rub(candidates, motions, h, work);
+        springs::damp(island.springs.iter().rev(), motions, 0.5 * h);
         drift(motions, island, (1.0 - before) * h);
         clock.lap(&mut work.solve_time);
     }

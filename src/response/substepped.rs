@@ -4,6 +4,7 @@
 //! mobility of its two bodies there; the rates of all contacts of a link add up. Sub-steps keep `w h` below the world's
 //! `substep_phase`, do not move a body by more than a part of its coat, and never get coarser while a contact lasts.
 
+use super::springs;
 use super::substep::{Island, Step};
 use crate::base::Motion;
 use crate::contact::candidate::Kept;
@@ -50,6 +51,7 @@ pub fn plan(
             }
         }
     }
+    springs::add_rates(&island.springs, motions, rates);
     let mut rate2 = 0.0f64;
     for link in &island.links {
         rate2 = rate2.max(std::mem::take(&mut rates[*link as usize]));

@@ -1,6 +1,6 @@
 //! Descriptors: everything a host says about a world, a body, a link and a skeleton, with defaults and ranges.
 
-use super::{Body, Link, Skeleton};
+use super::{Body, Link, Skeleton, Spring};
 use crate::base::Kind;
 pub use crate::contact::Scheme;
 use crate::error::{Result, out_of_range, require, require_finite};
@@ -14,6 +14,8 @@ pub type BodyId = crate::handle::Id<Body>;
 pub type LinkId = crate::handle::Id<Link>;
 /// Handle of a skeleton.
 pub type SkeletonId = crate::handle::Id<Skeleton>;
+/// Handle of a spring.
+pub type SpringId = crate::handle::Id<Spring>;
 
 /// Settings of a world.
 #[derive(Clone, Debug, PartialEq)]
@@ -379,5 +381,33 @@ impl SkeletonDesc {
             require("half extent of a box", half.min(), "> 0", |x| x > 0.0)?;
         }
         Ok(())
+    }
+}
+
+/// A damped spring between points of two links of one body. A fixed or host-driven link is an anchor.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SpringDesc {
+    /// The links that it joins.
+    pub links: [LinkId; 2],
+    /// Where its ends are, each in the frame of its link \[m\]; on a point mass, at the origin.
+    pub points: [Vec3; 2],
+    /// Length without force, from 0 to 1e9 \[m\].
+    pub rest_length: f64,
+    /// Force a metre of stretch, from 0 to 1e18 \[N/m\].
+    pub stiffness: f64,
+    /// Force along it a metre a second of lengthening, from 0 to 1e18 \[N s/m\].
+    pub damping: f64,
+    /// The host's own value.
+    pub user_data: usize,
+}
+
+impl SpringDesc {
+    pub(crate) fn validate(&self) -> Result<()> {
+        for point in &self.points {
+            require_finite("point of a spring", point)?;
+        }
+        require("rest_length", self.rest_length, "from 0 to 1e9", |x| (0.0..=1e9).contains(&x))?;
+        require("stiffness of a spring", self.stiffness, "from 0 to 1e18", |x| (0.0..=1e18).contains(&x))?;
+        require("damping of a spring", self.damping, "from 0 to 1e18", |x| (0.0..=1e18).contains(&x))
     }
 }

@@ -1,4 +1,4 @@
-//! The world: owns every body, link and skeleton; one [`World::step`] advances it.
+//! The world: owns every body, link, skeleton and spring; one [`World::step`] advances it.
 //!
 //! This file holds the nouns and their life; [`step`] is the pipeline, [`query`] what can be asked in between.
 
@@ -12,15 +12,17 @@ pub mod query;
 mod respond;
 mod sleep;
 mod snapshot;
+mod springs;
 mod step;
 mod units;
 
 use crate::handle::{Arena, Noun, WorldTag};
 pub use desc::{
-    BodyDesc, BodyId, LinkDesc, LinkId, Response, Scheme, SkeletonDesc, SkeletonId, StiffnessRule, VelocityConvention,
-    WorldDesc,
+    BodyDesc, BodyId, LinkDesc, LinkId, Response, Scheme, SkeletonDesc, SkeletonId, SpringDesc, SpringId,
+    StiffnessRule, VelocityConvention, WorldDesc,
 };
 pub use events::{Contact, Counters, Event, EventKind, LogLevel, Tally, Times};
+pub use springs::{Spring, SpringState};
 
 use crate::base::link::Kind;
 use crate::error::{Error, Result, require_finite};
@@ -33,6 +35,7 @@ use crate::team::{Alone, Tasks};
 pub struct Body {
     pub(crate) desc: BodyDesc,
     pub(crate) links: Vec<u32>,
+    pub(crate) springs: Vec<u32>,
     pub(crate) enabled: bool,
     /// What its descriptor comes to \[Pa\].
     pub(crate) stiffness_scale: f64,
@@ -55,7 +58,7 @@ pub struct Link {
     pub(crate) applied_force: Wrench,
     /// Impulses of the host for the next step, about the centre of mass.
     pub(crate) applied_impulse: Wrench,
-    /// Contact impulse over the last step, about the centre of mass.
+    /// Impulse of contacts and springs over the last step, about the centre of mass.
     pub(crate) contact_impulse: Wrench,
     /// What the host is to apply to a host-driven link after the last step, about the centre of mass.
     pub(crate) host_impulse: Wrench,
@@ -117,6 +120,7 @@ pub struct World {
     bodies: Arena<Body>,
     links: Arena<Link>,
     skeletons: Arena<Skeleton>,
+    springs: Arena<Spring>,
     log: Alone<Option<Log>>,
     pair_filter: Alone<Option<PairFilter>>,
     tasks: Alone<Option<Box<dyn Tasks>>>,
@@ -137,6 +141,7 @@ impl World {
             bodies: Arena::new(tag),
             links: Arena::new(tag),
             skeletons: Arena::new(tag),
+            springs: Arena::new(tag),
             log: Alone::default(),
             pair_filter: Alone::default(),
             tasks: Alone::default(),
@@ -196,6 +201,7 @@ impl World {
         self.bodies.insert(Body {
             desc,
             links: Vec::new(),
+            springs: Vec::new(),
             enabled: true,
             stiffness_scale,
             dissipation,
@@ -205,11 +211,14 @@ impl World {
         })
     }
 
-    /// Destroys a body with its links and skeletons.
+    /// Destroys a body with its links, skeletons and springs.
     pub fn destroy_body(&mut self, id: BodyId) -> Result<()> {
         self.bodies.get(id)?;
         self.rouse(id.raw.index);
         let body = self.bodies.remove(id)?;
+        for spring in body.springs {
+            self.springs.remove(self.springs.id_of(spring as usize))?;
+        }
         for link in body.links {
             self.drop_link(link as usize)?;
         }
@@ -292,9 +301,10 @@ impl World {
         Ok(id)
     }
 
-    /// Destroys a link with its skeletons.
+    /// Destroys a link with its skeletons and springs.
     pub fn destroy_link(&mut self, id: LinkId) -> Result<()> {
         let body = self.links.get(id)?.body as usize;
+        self.drop_springs_of(id)?;
         self.bodies[body].links.retain(|index| *index != id.raw.index);
         self.drop_link(id.index())?;
         self.refresh(body);
@@ -321,6 +331,7 @@ impl World {
         for skeleton in &self.links.get(id)?.skeletons {
             check_plane(&self.skeletons[*skeleton as usize].desc, desc.kind)?;
         }
+        self.check_ends(id, &desc)?;
         let link = self.links.get_mut(id)?;
         if desc.kind != link.desc.kind {
             link.mirror = Mirror::default();
@@ -332,7 +343,7 @@ impl World {
         Ok(())
     }
 
-    /// Takes a link and its skeletons out of the simulation, or puts them back.
+    /// Takes a link with its skeletons and springs out of the simulation, or puts them back.
     pub fn set_link_enabled(&mut self, id: LinkId, enabled: bool) -> Result<()> {
         let link = self.links.get_mut(id)?;
         link.enabled = enabled;
@@ -578,7 +589,7 @@ impl World {
         Ok(arm)
     }
 
-    /// Mean contact force and torque on a link over the last step, about its centre of mass.
+    /// Mean force and torque of contacts and springs on a link over the last step, about its centre of mass.
     pub fn link_wrench(&self, id: LinkId) -> Result<Wrench> {
         let link = self.links.get(id)?;
         let mut wrench = Wrench::default();

@@ -17,6 +17,9 @@ use crate::team::Team;
 /// responses.
 const STACKED: u8 = 10;
 
+/// Turn of a spring's swing in a step from which on it is stiff \[rad\].
+const STIFF: f64 = 0.3;
+
 /// Candidates from which on an island is stepped by all workers, and not by one of them beside other islands.
 const WIDE: usize = 24;
 
@@ -184,7 +187,7 @@ impl World {
             state.workers.push(Mutex::default());
         }
         for index in 0..state.island_count {
-            let (response, forced) = self.choose(&state.islands[index].island, state);
+            let (response, forced) = self.choose(&state.islands[index].island, state, dt);
             (state.islands[index].response, state.islands[index].forced) = (response, forced);
         }
         state.hand_out_candidates();
@@ -287,9 +290,9 @@ impl World {
     }
 
     /// The response of an island. What a body or the world forces holds for all that it touches, the most stable first;
-    /// left to itself, implicit is for what is jointed, held by its host, or stacked, and sub-steps for the rest. Also
-    /// whether it is forced.
-    fn choose(&self, island: &Island, state: &Stepping) -> (Response, bool) {
+    /// left to itself, implicit is for what is jointed, held by its host, stacked, or on stiff springs, and sub-steps for
+    /// the rest. Also whether it is forced.
+    fn choose(&self, island: &Island, state: &Stepping, dt: f64) -> (Response, bool) {
         let movable = |link: &&u32| state.motions[**link as usize].is_movable();
         let links = || island.links.iter().filter(movable).map(|link| &self.links[*link as usize]);
         let forced = |response| {
@@ -307,7 +310,8 @@ impl World {
             let host = link.desc.kind == Kind::Host && (link.desc.constrained || link.mirror.is_doubtful());
             host || self.bodies[link.body as usize].stacked > 0
         });
-        let implicit = held && !island.candidates.is_empty();
+        let stiff = island.springs.iter().any(|spring| spring.rate2(&state.motions).sqrt() * dt > STIFF);
+        let implicit = held && !island.candidates.is_empty() || stiff;
         (if implicit { Response::Implicit } else { Response::Substepped }, false)
     }
 

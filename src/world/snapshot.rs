@@ -8,7 +8,7 @@
 //! | 12 | version of the library that wrote it, as text filled up with zeros |
 //! | 8 | length of the whole |
 //! | 8 | origin: whose handles the objects have |
-//! | … | settings; bodies, links, skeletons with their slots; the memory of each pair of bodies near each other |
+//! | … | settings; bodies, links, skeletons, springs with their slots; the memory of each pair of bodies near each other |
 //! | 4 | CRC-32 of all before, which sees any damage of up to 32 bits in a row |
 //!
 //! What is written of each type stands in the lists below. A change of any list is a new [`FORMAT`].
@@ -18,8 +18,8 @@ use std::hash::{BuildHasher, RandomState};
 use super::bytes::{Counter, Cursor, Lasting, Reader, Sink, enums, structs, write_list};
 use super::sleep::Sleep;
 use super::{
-    Body, BodyDesc, Contact, Link, LinkDesc, Skeleton, SkeletonDesc, StiffnessRule, World, WorldDesc, check_plane,
-    desc, step, units::Said,
+    Body, BodyDesc, Contact, Link, LinkDesc, Skeleton, SkeletonDesc, Spring, SpringDesc, StiffnessRule, World,
+    WorldDesc, check_plane, desc, step, units::Said,
 };
 use crate::base::Kind;
 use crate::contact::Scheme;
@@ -34,7 +34,7 @@ use crate::response::{Response, VelocityConvention};
 use crate::team::Alone;
 
 /// What the lists below say. Another number is refused: no snapshot is ever half understood.
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
 const MAGIC: [u8; 8] = *b"isocoat\0";
 /// Offsets of the parts of the header.
 const FORMAT_AT: usize = 8;
@@ -69,13 +69,15 @@ structs! {
         user_data,
     }
     SkeletonDesc { shape, thickness, stiffness, stiffening, radius, seed_count, user_data }
+    SpringDesc { links, points, rest_length, stiffness, damping, user_data }
     // What the descriptor comes to follows from the parts.
-    Body { desc, links, enabled, stacked, units, sleep; stiffness_scale: 0.0, dissipation: 0.0 }
+    Body { desc, links, springs, enabled, stacked, units, sleep; stiffness_scale: 0.0, dissipation: 0.0 }
     Link {
         desc, body, skeletons, enabled, applied_force, applied_impulse, contact_impulse, host_impulse, last_dt, mirror,
     }
     // The profile and the reach follow from the descriptors; the rays are made at their first use.
     Skeleton { desc, link, enabled; profile: NO_PROFILE, reach: 0.0, rays: Default::default() }
+    Spring { desc }
     Said { sink, travel }
     Sleep { quiet, group }
     Mirror {
@@ -266,13 +268,25 @@ impl World {
     }
 
     fn write(&self, out: &mut impl Sink) {
-        let Self { desc, origin, own_tag: _, bodies, links, skeletons, log: _, pair_filter: _, tasks: _, stepping } =
-            self;
+        let Self {
+            desc,
+            origin,
+            own_tag: _,
+            bodies,
+            links,
+            skeletons,
+            springs,
+            log: _,
+            pair_filter: _,
+            tasks: _,
+            stepping,
+        } = self;
         origin.write(out);
         desc.write(out);
         write_arena(bodies, out);
         write_arena(links, out);
         write_arena(skeletons, out);
+        write_arena(springs, out);
         let (candidates, resting, contacts) = stepping.lasting();
         write_list(candidates.len(), candidates.iter().map(|candidate| candidate.lasting()), out);
         write_list(resting.len(), resting.iter(), out);
@@ -302,6 +316,7 @@ impl World {
             bodies: read_arena(&mut from)?,
             links: read_arena(&mut from)?,
             skeletons: read_arena(&mut from)?,
+            springs: read_arena(&mut from)?,
             log: Alone::default(),
             pair_filter: Alone::default(),
             tasks: Alone::default(),
@@ -324,6 +339,7 @@ impl World {
             fresh.bodies.go_on_from(&self.bodies);
             fresh.links.go_on_from(&self.links);
             fresh.skeletons.go_on_from(&self.skeletons);
+            fresh.springs.go_on_from(&self.springs);
             self.own_tag.number()
         } else {
             // Of the same origin are only those snapshots that this world takes from now on.
@@ -334,6 +350,12 @@ impl World {
         fresh.bodies.set_world(tag);
         fresh.links.set_world(tag);
         fresh.skeletons.set_world(tag);
+        fresh.springs.set_world(tag);
+        for index in 0..fresh.springs.capacity() {
+            if let Some(spring) = fresh.springs.at_mut(index) {
+                spring.desc.links.iter_mut().for_each(|id| id.raw.world = tag);
+            }
+        }
         for id in memories.iter_mut().chain(&mut resting).flat_map(|memory| &mut memory.ids) {
             id.world = tag;
         }
@@ -343,20 +365,39 @@ impl World {
             skeletons.iter_mut().for_each(|id| id.raw.world = tag);
         }
         fresh.take_rays_of(self);
-        let World { desc, origin, own_tag: _, bodies, links, skeletons, log: _, pair_filter: _, tasks: _, stepping: _ } =
-            fresh;
+        let World {
+            desc,
+            origin,
+            own_tag: _,
+            bodies,
+            links,
+            skeletons,
+            springs,
+            log: _,
+            pair_filter: _,
+            tasks: _,
+            stepping: _,
+        } = fresh;
         (self.desc, self.origin) = (desc, origin);
-        (self.bodies, self.links, self.skeletons) = (bodies, links, skeletons);
+        (self.bodies, self.links, self.skeletons, self.springs) = (bodies, links, skeletons, springs);
         self.stepping.restart(memories, resting, contacts);
         Ok(())
     }
 
-    /// Every link belongs to the one body that lists it, every skeleton to the one link.
+    /// Every link belongs to the one body that lists it, every skeleton to the one link, every spring to the body of its
+    /// links.
     fn check_owners(&self) -> Result<()> {
         let bodies = self.bodies.indices().map(|body| (body, &self.bodies[body].links));
         let links = self.links.indices().map(|link| (link, &self.links[link].skeletons));
-        check_lists("body", bodies, &self.links, |link| link.body)?;
-        check_lists("link", links, &self.skeletons, |skeleton| skeleton.link)
+        check_lists("body", bodies, &self.links, |_, link| link.body)?;
+        check_lists("link", links, &self.skeletons, |_, skeleton| skeleton.link)?;
+        let mut body_of = vec![0; self.springs.capacity()];
+        for index in self.springs.indices() {
+            let body = self.check_spring(&self.springs[index].desc);
+            body_of[index] = body.map_err(|error| refused(format_args!("spring {index}"), error))?.raw.index;
+        }
+        let springs = self.bodies.indices().map(|body| (body, &self.bodies[body].springs));
+        check_lists("body", springs, &self.springs, |index, _| body_of[index])
     }
 
     /// Descriptors as creation checks them, and the rest of what a step begins with.
@@ -500,12 +541,12 @@ fn check_lists<'a, T: Noun>(
     owner_noun: &str,
     lists: impl Iterator<Item = (usize, &'a Vec<u32>)>,
     owned: &Arena<T>,
-    owner_of: impl Fn(&T) -> u32,
+    owner_of: impl Fn(usize, &T) -> u32,
 ) -> Result<()> {
     let mut is_listed = vec![false; owned.capacity()];
     for (owner, list) in lists {
         for index in list.iter().map(|index| *index as usize) {
-            let ours = owned.is_live(index) && owner_of(&owned[index]) as usize == owner;
+            let ours = owned.is_live(index) && owner_of(index, &owned[index]) as usize == owner;
             if !ours || std::mem::replace(&mut is_listed[index], true) {
                 let noun = T::NAME;
                 return Err(Error::Snapshot(format!(

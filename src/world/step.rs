@@ -365,6 +365,7 @@ impl World {
         for group in &mut state.islands {
             group.island.links.clear();
             group.island.candidates.clear();
+            group.island.springs.clear();
             group.supports.clear();
         }
         state.island_of.clear();
@@ -396,7 +397,9 @@ impl World {
             if movable(body as u32) {
                 let root = find(&mut state.roots, body as u32);
                 let island = island_for(root, &mut state.islands, &mut state.island_of);
-                state.islands[island].island.links.extend(&self.bodies[body].links);
+                let island = &mut state.islands[island].island;
+                island.links.extend(&self.bodies[body].links);
+                self.gather_springs(&self.bodies[body], &state.motions, &mut island.springs);
             }
         }
         state.island_count = count;

@@ -83,6 +83,32 @@ static void nouns()
     }
 }
 
+static void springs()
+{
+    isocoat::world world;
+    isocoat::body body = world.create_body();
+    isocoat_link_desc link = isocoat_link_desc_default();
+    isocoat_spring_desc desc = isocoat_spring_desc_default();
+    desc.links[0] = body.create_link(link).raw();
+    link.kind = ISOCOAT_LINK_POINT_MASS;
+    link.mass = 1.0;
+    link.pose.position[0] = 3.0;
+    desc.links[1] = body.create_link(link).raw();
+    desc.stiffness = 10.0;
+    desc.rest_length = 1.0;
+    isocoat::spring spring = world.create_spring(desc);
+    CHECK(spring.state().tension == 20.0 && spring.user_data() == nullptr && body.springs().size() == 1);
+    desc.stiffness = 20.0;
+    spring.set_desc(desc);
+    CHECK(spring.desc().stiffness == 20.0 && spring.state().tension == 40.0);
+    const std::vector<isocoat_spring_desc> row(4, desc);
+    const std::vector<isocoat::spring> made = world.create_springs(row);
+    CHECK(made.size() == 4 && body.springs().size() == 5 && body.springs()[4] == made[3]);
+    CHECK(world.create_springs({}).empty());
+    spring.destroy();
+    CHECK(body.springs().size() == 4);
+}
+
 static void worlds_move()
 {
     isocoat::world first = falling_world();
@@ -299,6 +325,7 @@ int main()
 {
     isocoat::check_abi();
     nouns();
+    springs();
     worlds_move();
     steps_and_views();
     what_a_callback_throws_comes_out_of_the_step();
