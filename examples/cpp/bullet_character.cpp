@@ -45,6 +45,7 @@ int main(int argc, char **argv) {
             if (frame % 60 == 59) {
                 std::printf("%5.1f s   head at %5.2f m   fastest %7.4f m/s   contacts with itself %2d   in all %2d\n",
                             scene.time(), scene.height(2), scene.fastest(), now, scene.contacts());
+                std::fflush(stdout);
             }
         }
         std::printf("%d contacts with itself at most; still since %.1f s; %.2f ms a frame\n", most, still_since,

@@ -19,8 +19,11 @@ use crate::math::Vec3;
 
 /// Side of a cell of the first grid, in units of the patch's predicted radius.
 const GRID: f64 = 0.5;
-/// Most cells of one patch, split ones included.
-const MOST_CELLS: usize = 30_000;
+/// Most cells of one patch, split ones included, at the finest tolerance, and at the coarsest; in between, this over
+/// the tolerance. What cannot be resolved, such as a patch that is bent round an edge, must not hold up a step.
+const MOST_CELLS: f64 = 30_000.0;
+const FEWEST_CELLS: f64 = 1_000.0;
+const CELLS: f64 = 50.0;
 /// Most cells of the first grid: more are finer than it takes to begin with.
 const MOST_FIRST_CELLS: usize = 256;
 /// Most halvings of a cell.
@@ -229,6 +232,7 @@ impl Work<'_, '_> {
 
     /// Splits the cells that matter most until the estimate meets the tolerance; gives the estimate.
     fn refine(&mut self, tolerance: f64) -> f64 {
+        let most = (CELLS / tolerance).clamp(FEWEST_CELLS, MOST_CELLS) as usize;
         loop {
             let (mut force, mut error, mut worst, mut live) = (Vec3::zeros(), 0.0, 0.0f64, 0usize);
             for cell in self.workspace.cells.iter().filter(|cell| !cell.split) {
@@ -241,13 +245,14 @@ impl Work<'_, '_> {
             }
             let size = force.norm();
             let relative = if size > 0.0 { error / size } else { 1.0 };
-            if self.leans || relative <= tolerance || worst == 0.0 || self.workspace.cells.len() + 4 > MOST_CELLS {
+            if self.leans || relative <= tolerance || worst == 0.0 || self.workspace.cells.len() + 4 > most {
                 return relative.min(1.0) + 1e-14;
             }
             let limit = (0.2 * worst).max(0.25 * tolerance * size / live as f64).min(worst);
             for index in 0..self.workspace.cells.len() {
                 let cell = &self.workspace.cells[index];
-                if !cell.split && cell.half > 1 && cell.error + cell.aside >= limit {
+                let room = self.workspace.cells.len() + 4 <= most;
+                if !cell.split && cell.half > 1 && cell.error + cell.aside >= limit && room {
                     self.split(index);
                 }
             }
