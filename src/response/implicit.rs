@@ -38,7 +38,7 @@ const BLOCK_OF_PAIRS: usize = 16;
 const TOGETHER: usize = 8;
 
 /// Velocity that a round may leave unsolved, over the velocity at work and the motion that it may leave unseen.
-const ACCURACY: f64 = 2e-5;
+const ACCURACY: f64 = 2e-8;
 
 /// How much faster a link may get in a step than any is before it, or differ from its free motion, by guess.
 const RUSH: f64 = 4.0;
