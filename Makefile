@@ -32,7 +32,8 @@ STAGE     := $(WORK)/stage
 OUT       := out
 STATICLIB := $(TARGET)/release/libisocoat.a
 SHAREDLIB := $(TARGET)/release/libisocoat.$(if $(filter Darwin,$(shell uname -s)),dylib,so)
-HEADERS   := $(wildcard include/isocoat/* bindings/*/*.hpp tests/c/*.h tests/cpp/*.h tests/cpp/*.hpp)
+HEADERS   := $(wildcard include/isocoat/* bindings/*/*.hpp tests/c/*.h tests/cpp/*.h tests/cpp/*.hpp \
+               examples/common/*.h examples/cpp/*.hpp)
 
 WARNINGS     := -Wall -Wextra -Wpedantic -Wshadow -Werror
 C_FLAGS      := -std=c11 -O2 -g $(WARNINGS) -Wstrict-prototypes -Iinclude

@@ -66,6 +66,15 @@ public:
         return speed;
     }
 
+    /// Height of the lowest limb's centre [m].
+    double lowest() const {
+        double least = height(0);
+        for (std::size_t i = 1; i < links_.size(); ++i) {
+            least = std::min(least, height(i));
+        }
+        return least;
+    }
+
     int contacts() const { return int(coats.contacts().size()); }
     /// Contacts of the character with itself.
     int self_contacts() const {
