@@ -1,7 +1,8 @@
 /*
- * A cube of jelly falls on its corner: 64 point masses, each with a coat, held together by springs along edges and across
- * faces and cells. With a folder as argument it leaves pictures there. Exits 0 when there is never more energy than at the
- * start, when the cube lies still in the end with the ground carrying its weight, and when no edge is off by over 5 %.
+ * A cube of jelly falls on its corner: 64 point masses, each with a coat, held together by springs along edges and
+ * across faces and cells. With a folder as argument it leaves pictures there. Exits 0 when there is never more energy
+ * than at the start, when the cube lies still in the end with the ground carrying its weight, and when no edge is off
+ * by 5 % then.
  */
 #include <isocoat/isocoat.h>
 
@@ -70,12 +71,12 @@ static int add_jelly(isocoat_world *world, jelly *cube)
     picture_normalise(z);
     picture_cross(z, x, y);
     for (int index = 0; index < MASSES; ++index) {
-        const double a = SPACING * (index % SIDE), b = SPACING * (index / SIDE % SIDE), c = SPACING * (index / SIDE / SIDE);
+        const int column = index % SIDE, row = index / SIDE % SIDE, layer = index / SIDE / SIDE;
         isocoat_link_desc link_desc = isocoat_link_desc_default();
         link_desc.kind = ISOCOAT_LINK_POINT_MASS;
         link_desc.mass = MASS;
         for (int k = 0; k < 3; ++k) {
-            places[index][k] = a * x[k] + b * y[k] + c * z[k] + (k == 2 ? 0.3 : 0.0);
+            places[index][k] = SPACING * (column * x[k] + row * y[k] + layer * z[k]) + (k == 2 ? 0.3 : 0.0);
             link_desc.pose.position[k] = places[index][k];
         }
         CHECK(isocoat_link_create(world, cube->body, &link_desc, &cube->masses[index]));
@@ -91,7 +92,8 @@ static int add_jelly(isocoat_world *world, jelly *cube)
     cube->spring_count = 0;
     for (int i = 0; i < MASSES; ++i) {
         for (int j = 0; j < i; ++j) {
-            const double line[3] = {places[i][0] - places[j][0], places[i][1] - places[j][1], places[i][2] - places[j][2]};
+            double line[3];
+            for (int k = 0; k < 3; ++k) line[k] = places[i][k] - places[j][k];
             const double length = sqrt(picture_dot(line, line));
             /* Up to the diagonal of a cell, 1.73 spacings; the next is along two edges. */
             if (length < 1.8 * SPACING) {
@@ -153,8 +155,8 @@ int main(int count, char **arguments)
     if (add_ground(world) || add_jelly(world, &cube) || measure(world, &cube, &now)) return 1;
     const double start = now.energy;
     double highest = start, most = 0.0;
-    printf("%d masses, %d springs\ntime [s]  energy [J]  height [m]  fastest [m/s]  carried/weight  edges off by [%%]\n",
-           MASSES, (int)cube.spring_count);
+    printf("%d masses, %d springs\n", MASSES, (int)cube.spring_count);
+    printf("time [s]  energy [J]  height [m]  fastest [m/s]  carried/weight  edges off by [%%]\n");
     for (int tick = 0;; ++tick) {
         if (tick % 20 == 0) {
             printf("%8.2f %11.4f %11.4f %14.4f %15.4f %17.2f\n", tick * STEP, now.energy, now.height, now.fastest,
@@ -166,14 +168,16 @@ int main(int count, char **arguments)
             snprintf(path, sizeof path, "%s/jelly%02d.ppm", arguments[1], tick / 5);
             if (picture_write(world, &view, UINT64_MAX, 320, 320, path)) return 1;
         }
-        if (tick == (int)(SECONDS / STEP)) break;
+        if (tick == (int)lround(SECONDS / STEP)) break;
         CHECK(isocoat_world_step(world, STEP));
         if (measure(world, &cube, &now)) return 1;
         highest = fmax(highest, now.energy);
         most = fmax(most, now.strain);
     }
-    printf("energy %.4f J at first, never above %.4f J; edges off by up to %.1f %% on the way, %.1f %% at rest\n", start,
-           highest, 100.0 * most, 100.0 * now.strain);
+    printf("energy %.4f J at first, never above %.4f J; edges off by up to %.1f %% on the way, %.1f %% at rest\n",
+           start, highest, 100.0 * most, 100.0 * now.strain);
     isocoat_world_destroy(world);
-    return highest <= start * (1.0 + 1e-9) && now.fastest < 1e-3 && fabs(now.carried - 1.0) < 1e-2 && now.strain < 0.05 ? 0 : 1;
+    return highest <= start * (1.0 + 1e-9) && now.fastest < 1e-3 && fabs(now.carried - 1.0) < 1e-2 && now.strain < 0.05
+               ? 0
+               : 1;
 }

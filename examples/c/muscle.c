@@ -1,8 +1,8 @@
 /*
- * An arm flexes: bones of the upper arm and of the forearm and a biceps of points, all in one coat that keeps the volume of
- * each of its parts. The target volume of the biceps doubles while the elbow bends, and returns. With a folder as argument
- * it leaves pictures there. Exits 0 when half a second after its target came to rest the biceps has it, within 2 %, both
- * times, and when in the end its neighbours have the volume that they began with, within 3 %.
+ * An arm flexes: bones of the upper arm and of the forearm and a biceps of points, all in one coat that keeps the
+ * volume of each of its parts. The target volume of the biceps doubles while the elbow bends, and returns. With a
+ * folder as argument it leaves pictures there. Exits 0 when half a second after its target came to rest the biceps has
+ * it, within 2 %, both times, and when in the end its neighbours have the volume that they began with, within 3 %.
  */
 #include <isocoat/isocoat.h>
 
@@ -115,7 +115,8 @@ int main(int count, char **arguments)
     if (measure(world, parts, rest)) return 1;
 
     printf("volumes over those at rest\ntime [s]  bend [deg]   target   biceps  upper arm  forearm    hand\n");
-    const int flexed = (int)lround((FLEX_AT + RAMP + HOLD) / STEP), relaxed = (int)lround((RELAX_AT + RAMP + HOLD) / STEP);
+    const int flexed = (int)lround((FLEX_AT + RAMP + HOLD) / STEP);
+    const int relaxed = (int)lround((RELAX_AT + RAMP + HOLD) / STEP);
     double error = 0.0, neighbours = 0.0;
     for (int tick = 0; tick <= relaxed; ++tick) {
         const double time = tick * STEP, flex = flexion(time);
@@ -148,8 +149,8 @@ int main(int count, char **arguments)
     for (int k = 1; k < 4; ++k) {
         neighbours = fmax(neighbours, fabs(now[k] - 1.0));
     }
-    printf("%.1f s after its target came to rest the biceps is off by at most %.2f %%; in the end its neighbours by %.2f %%\n",
-           HOLD, 100.0 * error, 100.0 * neighbours);
+    printf("%.1f s after its target came to rest the biceps is off by at most %.3f %%; in the end its neighbours by "
+           "%.3f %%\n", HOLD, 100.0 * error, 100.0 * neighbours);
     isocoat_world_destroy(world);
     return error < 0.02 && neighbours < 0.03 ? 0 : 1;
 }
