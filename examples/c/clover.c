@@ -186,7 +186,8 @@ int main(int count, char **arguments)
     }
     const double speed = speed_of(&state);
     printf("%d flights; energy %.4f J at first, %.4f J in the last of them, gained at most %.1e J\n"
-           "half through the coat %d times; in the end no faster than %.1e m/s\n", flights, start, flight, gained, (int)through, speed);
+           "half through the coat %d times; in the end no faster than %.1e m/s\n",
+           flights, start, flight, gained, (int)through, speed);
     isocoat_world_destroy(world);
     return flights >= 3 && gained < 1e-6 * start && through == 0 && speed < 2e-3 &&
                    state.pose.position[0] > STAIRS * DEPTH
