@@ -117,6 +117,14 @@ demo-plot:
 	@mkdir -p $(OUT)
 	$(CARGO) run --release --quiet --example two_balls_plot -- $(OUT)/two_balls.svg
 
+SCENES := clover muscle jelly cpp/walk cpp/bullet_character
+
+.PHONY: scenes
+scenes: $(SCENES:%=$(WORK)/examples/%) ## characters, muscles, jelly: run each scene, with pictures in out/
+	@for scene in $(SCENES); do \
+		printf '\n== %s\n' $$scene; mkdir -p $(OUT)/$${scene##*/} && $(WORK)/examples/$$scene $(OUT)/$${scene##*/} || exit 1; \
+	done
+
 # ---- test ------------------------------------------------------------------------------------------------------------
 
 # In this order; the first that fails stops the run. Each is also a target: `make test-valgrind`. What cargo runs comes
