@@ -3,7 +3,7 @@
 //!
 //! A seed goes out from its skeleton along its ray, until it meets the coat's surface or the territory of another
 //! skeleton \[97, section 5.1\]. Where two fields are equal, the territory belongs to the skeleton that comes first, as
-//! in [`blend::territory`](crate::field::blend::territory), within a tolerance that keeps rounding out of it.
+//! in [`blend::territory`], within a tolerance that keeps rounding out of it.
 //!
 //! Seeds move only when the links of a body move relative to each other, so a root need not be fast: it is found from
 //! a bracket that depends on the coat alone, never on where the seed was before. The same coat gives the same bits,
