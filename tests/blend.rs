@@ -338,6 +338,81 @@ fn limbs_that_share_a_neighbour_dont_push_each_other_apart_at_rest() {
 }
 
 #[test]
+fn nothing_brakes_limbs_within_the_territory_of_their_neighbour() {
+    for response in [Response::Implicit, Response::Substepped, Response::Auto] {
+        let ends = [false, true].map(|self_contact| {
+            let mut world = World::new(WorldDesc { response, ..WorldDesc::default() }).unwrap();
+            let chain = [Vec3::zeros(), Vec3::new(0.4, 0.0, 0.0), Vec3::new(0.8, 0.0, 0.0)];
+            let (body, links, _) = limbs(&mut world, &chain, Kind::Rigid, &[(0, 1), (1, 2)]);
+            let desc = BodyDesc { self_contact, ..world.body_desc(body).unwrap().clone() };
+            world.set_body_desc(body, desc).unwrap();
+            for (link, speed) in [(links[0], 0.3), (links[2], -0.3)] {
+                let pose = world.link_state(link).unwrap().pose;
+                let twist = Twist { linear: Vec3::new(speed, 0.0, 0.0), angular: Vec3::zeros() };
+                world.set_link_state(link, &LinkState { pose, twist }).unwrap();
+            }
+            for _ in 0..30 {
+                world.step(DT).unwrap();
+            }
+            [links[0], links[2]].map(|link| world.link_state(link).unwrap().pose.position)
+        });
+        for (free, coated) in ends[0].iter().zip(&ends[1]) {
+            assert!((free - coated).norm() < 1e-12, "{response:?}: {free} {coated}");
+        }
+    }
+}
+
+#[test]
+fn who_leans_on_a_body_wakes_while_its_weights_are_on_their_way() {
+    let gravity = Vec3::new(0.0, 0.0, -G);
+    let mut world = World::new(WorldDesc { gravity, sleep_time: 0.2, ..WorldDesc::default() }).unwrap();
+    let (_, _, skeletons) = limbs(&mut world, &[Vec3::new(-0.3, 0.0, 0.0), Vec3::new(0.3, 0.0, 0.0)], Kind::Fixed, &[]);
+    let ball = LinkDesc { kind: Kind::PointMass, mass: 1.0, pose: Pose::at(0.0, 0.0, 0.94), ..LinkDesc::default() };
+    let body = BodyDesc { response: Response::Implicit, dissipation: 1.0, ..Coat::ball(T).body_desc() };
+    let (top, _) = Coat::ball(T).add(&mut world, body, ball);
+    for _ in 0..600 {
+        world.step(DT).unwrap();
+    }
+    assert!(!world.body_is_awake(top).unwrap());
+    world.set_blend(skeletons[0], skeletons[1], 1.0, 2.0).unwrap();
+    for _ in 0..110 {
+        world.step(DT).unwrap();
+        assert!(world.body_is_awake(top).unwrap());
+    }
+}
+
+#[test]
+fn parts_that_can_never_move_dont_collide() {
+    let mut world = World::new(WorldDesc::default()).unwrap();
+    let body = world.create_body(BodyDesc::default()).unwrap();
+    for normal in [Vec3::x(), Vec3::y()] {
+        let link = world.create_link(body, LinkDesc::default()).unwrap();
+        let shape = Shape::plane(Vec3::zeros(), normal).unwrap();
+        world.create_skeleton(link, SkeletonDesc { shape, ..SkeletonDesc::default() }).unwrap();
+    }
+    world.blend_neighbours(body, &[]).unwrap();
+    world.step(DT).unwrap();
+    assert!(world.contacts().is_empty() && world.events().is_empty());
+    let mut kept = Vec::new();
+    world.snapshot(&mut kept);
+    world.restore(&kept).unwrap();
+}
+
+#[test]
+fn a_weight_on_its_way_to_too_many_groups_is_refused_at_once() {
+    let mut world = World::new(WorldDesc::default()).unwrap();
+    let body = world.create_body(BodyDesc::default()).unwrap();
+    let mut skeletons = Vec::new();
+    for _ in 0..27 {
+        let link = world.create_link(body, LinkDesc::default()).unwrap();
+        skeletons.push(world.create_skeleton(link, SkeletonDesc::default()).unwrap());
+    }
+    let pairs = skeletons.chunks(3).flat_map(|trio| [(trio[0], trio[1]), (trio[1], trio[2]), (trio[0], trio[2])]);
+    let refused = pairs.filter(|(a, b)| world.set_blend(*a, *b, 0.0, 1.0).is_err()).count();
+    assert!(refused > 0);
+}
+
+#[test]
 fn a_limb_that_folds_over_its_joint_meets_a_force_that_grows_from_nothing() {
     let fold = |angle: f64| {
         let mut world = World::new(WorldDesc::default()).unwrap();

@@ -1171,15 +1171,16 @@ isocoat_status isocoat_skeleton_get_blend(const isocoat_world *world,
 
 /**
  * Lets exactly those skeletons of a body blend that are of the same link, or of two links that are joined; also those
- * created later. Weights set before are forgotten.
+ * created later. Weights set before are forgotten; not which pairs may not collide.
  *
  * - world: not NULL.
  * - body: the body.
  * - joints: 2 handles a joint, links of the body; not NULL unless count is 0.
  * - count: number of joints.
  *
- * Errors: INVALID_HANDLE, INVALID_ARGUMENT, UNSUPPORTED (a link of another body; a link joined to itself; a graph with
- * more than 4096 groups of skeletons that all blend). Threads: changes the world.
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE (more than 1024 skeletons), UNSUPPORTED (a link of another
+ * body; a link joined to itself; a graph with more than 4096 groups of skeletons that all blend). Threads: changes the
+ * world.
  */
 ISOCOAT_MUST_USE
 isocoat_status isocoat_body_blend_neighbours(isocoat_world *world,
@@ -1188,7 +1189,7 @@ isocoat_status isocoat_body_blend_neighbours(isocoat_world *world,
                                              size_t count);
 
 /**
- * Lets all skeletons of a body blend, as in the beginning.
+ * Lets all skeletons of a body blend, as in the beginning; also forgets which pairs may not collide.
  *
  * - world: not NULL.
  * - body: the body.
@@ -1204,7 +1205,7 @@ ISOCOAT_MUST_USE isocoat_status isocoat_body_blend_all(isocoat_world *world, iso
  * - a, b: two skeletons of one body.
  * - enabled: whether they may collide.
  *
- * Errors: INVALID_HANDLE, UNSUPPORTED. Threads: changes the world.
+ * Errors: INVALID_HANDLE, OUT_OF_RANGE (more than 1024 skeletons), UNSUPPORTED. Threads: changes the world.
  */
 ISOCOAT_MUST_USE
 isocoat_status isocoat_skeleton_set_pair_contact(isocoat_world *world,
@@ -1810,7 +1811,10 @@ typedef struct isocoat_contact {
 /** What happened to a pair of bodies: an ISOCOAT_EVENT_ value. More may come. */
 typedef uint32_t isocoat_event_kind;
 
-/** The coats began to touch. */
+/**
+ * The coats began to touch. Of a body with itself, whose events name it twice, there is one for each pair of groups of
+ * its parts: count them.
+ */
 #define ISOCOAT_EVENT_BEGIN 0u
 /** The coats stopped touching. */
 #define ISOCOAT_EVENT_END 1u
@@ -2034,11 +2038,11 @@ isocoat_status isocoat_body_evaluate_field_deformed(const isocoat_world *world,
                                                     double *gradients);
 
 /**
- * The contacts that two bodies would have at their present poses. Changes nothing, and asks neither categories nor the
- * pair filter.
+ * The contacts that two bodies would have at their present poses, or, for one body twice, those of its parts that don't
+ * blend. Changes nothing, and asks neither categories nor the pair filter.
  *
  * - world: not NULL.
- * - body_a, body_b: two different bodies.
+ * - body_a, body_b: two bodies, or one twice.
  * - scheme: how to integrate, an ISOCOAT_SCHEME_ value.
  * - tolerance: relative error accepted in the force, from 1e-9 to 0.5.
  * - contacts: receives the contacts; NULL with capacity 0 asks for the count only.

@@ -58,15 +58,16 @@ pub unsafe extern "C" fn isocoat_skeleton_get_blend(
 }
 
 /// Lets exactly those skeletons of a body blend that are of the same link, or of two links that are joined; also those
-/// created later. Weights set before are forgotten.
+/// created later. Weights set before are forgotten; not which pairs may not collide.
 ///
 /// - world: not NULL.
 /// - body: the body.
 /// - joints: 2 handles a joint, links of the body; not NULL unless count is 0.
 /// - count: number of joints.
 ///
-/// Errors: INVALID_HANDLE, INVALID_ARGUMENT, UNSUPPORTED (a link of another body; a link joined to itself; a graph with
-/// more than 4096 groups of skeletons that all blend). Threads: changes the world.
+/// Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE (more than 1024 skeletons), UNSUPPORTED (a link of another
+/// body; a link joined to itself; a graph with more than 4096 groups of skeletons that all blend). Threads: changes the
+/// world.
 #[must_use]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn isocoat_body_blend_neighbours(
@@ -85,7 +86,7 @@ pub unsafe extern "C" fn isocoat_body_blend_neighbours(
     }
 }
 
-/// Lets all skeletons of a body blend, as in the beginning.
+/// Lets all skeletons of a body blend, as in the beginning; also forgets which pairs may not collide.
 ///
 /// - world: not NULL.
 /// - body: the body.
@@ -104,7 +105,7 @@ pub unsafe extern "C" fn isocoat_body_blend_all(world: *mut isocoat_world, body:
 /// - a, b: two skeletons of one body.
 /// - enabled: whether they may collide.
 ///
-/// Errors: INVALID_HANDLE, UNSUPPORTED. Threads: changes the world.
+/// Errors: INVALID_HANDLE, OUT_OF_RANGE (more than 1024 skeletons), UNSUPPORTED. Threads: changes the world.
 #[must_use]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn isocoat_skeleton_set_pair_contact(

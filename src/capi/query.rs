@@ -156,11 +156,11 @@ pub unsafe extern "C" fn isocoat_body_evaluate_field_deformed(
     }
 }
 
-/// The contacts that two bodies would have at their present poses. Changes nothing, and asks neither categories nor the
-/// pair filter.
+/// The contacts that two bodies would have at their present poses, or, for one body twice, those of its parts that don't
+/// blend. Changes nothing, and asks neither categories nor the pair filter.
 ///
 /// - world: not NULL.
-/// - body_a, body_b: two different bodies.
+/// - body_a, body_b: two bodies, or one twice.
 /// - scheme: how to integrate, an ISOCOAT_SCHEME_ value.
 /// - tolerance: relative error accepted in the force, from 1e-9 to 0.5.
 /// - contacts: receives the contacts; NULL with capacity 0 asks for the count only.

@@ -81,7 +81,8 @@ impl From<&Contact> for isocoat_contact {
 
 /// What happened to a pair of bodies: an ISOCOAT_EVENT_ value. More may come.
 pub type isocoat_event_kind = u32;
-/// The coats began to touch.
+/// The coats began to touch. Of a body with itself, whose events name it twice, there is one for each pair of groups of
+/// its parts: count them.
 pub const ISOCOAT_EVENT_BEGIN: isocoat_event_kind = 0;
 /// The coats stopped touching.
 pub const ISOCOAT_EVENT_END: isocoat_event_kind = 1;

@@ -30,8 +30,11 @@ impl Weights {
     }
 }
 
-/// Most cliques that a graph may have: a graph of `n` skeletons can have `3^(n/3)`.
+/// Most cliques that a graph may have, those of all its weights together: `n` skeletons can have `3^(n/3)`.
 pub const MOST_CLIQUES: usize = 4096;
+const TOO_MANY: Error = Error::Unsupported(
+    "the blend graph has more than 4096 cliques: largest sets of skeletons of which every two blend",
+);
 
 /// The graph of the fields, with a band in units of the field. Refuses one of more than [`MOST_CLIQUES`] cliques.
 pub fn graph(weights: &Weights, band: f64) -> Result<Graph> {
@@ -42,9 +45,13 @@ pub fn graph(weights: &Weights, band: f64) -> Result<Graph> {
     if !weights.weights.iter().any(|weight| *weight < 1.0) {
         return Ok(graph);
     }
-    let mut below = 0.0;
+    let (mut below, mut count) = (0.0, 0);
     for threshold in thresholds {
         let cliques = largest_cliques(weights, threshold)?;
+        count += cliques.len();
+        if count > MOST_CLIQUES {
+            return Err(TOO_MANY);
+        }
         let mut cliques_of = vec![Vec::new(); weights.count];
         for (index, clique) in cliques.iter().enumerate() {
             clique.iter().for_each(|skeleton| cliques_of[*skeleton as usize].push(index as u32));
@@ -115,9 +122,7 @@ fn extend(
     let pivot = open.iter().chain(done.iter()).max_by_key(|index| open.and(&neighbours[*index]).len());
     let Some(pivot) = pivot else {
         if found.len() == MOST_CLIQUES {
-            return Err(Error::Unsupported(
-                "the blend graph has more than 4096 cliques: largest sets of skeletons of which every two blend",
-            ));
+            return Err(TOO_MANY);
         }
         let mut sorted = clique.clone();
         sorted.sort_unstable();

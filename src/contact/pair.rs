@@ -217,6 +217,12 @@ impl Pair {
         (height(&highest) > self.a.isovalue).then_some(highest)
     }
 
+    /// Whether a point lies in the territory of one that blends with both sides, so that these don't touch there,
+    /// however close they are.
+    pub fn is_covered(&self, p: &Vec3) -> bool {
+        self.highest_cover(p).is_some() && self.sample(p).sum <= 0.0
+    }
+
     fn combine(&self, (alpha, ga): (f64, Vec3), (beta, gb): (f64, Vec3)) -> Sample {
         Sample {
             difference: self.wa * alpha - self.wb * beta,

@@ -97,7 +97,7 @@ fn find_patches(pair: &Pair, settings: &Settings, out: &mut Surface) -> Option<(
             let (ta, tb) = (pair.a.skeletons[i].profile.thickness, pair.b.skeletons[j].profile.thickness);
             let overlap = (ta + tb - approach.distance) / ta.min(tb);
             // Where a neighbour lies between two parts of a body, these may be as close as they like.
-            let between = !pair.covers.is_empty() && pair.sample(&approach.meeting).sum <= 0.0;
+            let between = pair.is_covered(&approach.meeting);
             if overlap > most.0 && !between {
                 most = (overlap, Some((i, j, approach)));
             }

@@ -16,7 +16,7 @@
 //! the edges with `b >= τ`. So for two skeletons it is `max + b min`, and for any the field is continuous in every weight.
 
 /// Which skeletons add their fields, by their positions in a list. The default is the complete graph: all add up.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Debug, Default, PartialEq)]
 pub struct Graph {
     /// Band `κ_0` of the smooth maximum, in units of the field.
     band: f64,
@@ -65,6 +65,22 @@ pub enum Order {
     Slopes,
     /// Slopes and bends.
     Bends,
+}
+
+impl Clone for Graph {
+    fn clone(&self) -> Self {
+        let mut copy = Self::default();
+        copy.clone_from(self);
+        copy
+    }
+
+    /// Into the memory that is there.
+    fn clone_from(&mut self, from: &Self) {
+        self.band = from.band;
+        self.levels.clone_from(&from.levels);
+        self.starts.clone_from(&from.starts);
+        self.cliques.clone_from(&from.cliques);
+    }
 }
 
 impl Graph {
@@ -170,7 +186,7 @@ impl Graph {
         work.slopes.clear();
         work.slopes.resize(active.len(), 0.0);
         work.bends.clear();
-        work.bends.resize(active.len() * active.len(), 0.0);
+        work.bends.resize(if order == Order::Bends { active.len() * active.len() } else { 0 }, 0.0);
         let mut value = 0.0;
         for (level, Level { share, count }) in self.levels.iter().enumerate() {
             value += share * self.combine_level(level, *count as usize, active, work);
@@ -252,7 +268,7 @@ impl Graph {
 /// From scores, the largest of which is 0, to the weights that maximise `Σ w z + (1 - Σ w²)/2`: the point of the simplex
 /// next to them. Gives the sum of their squares.
 fn weigh(top: &mut Vec<(u32, f64)>) -> f64 {
-    top.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    top.sort_unstable_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
     let (mut sum, mut level) = (0.0, 0.0);
     for (place, (_, score)) in top.iter().enumerate() {
         let count = (place + 1) as f64;

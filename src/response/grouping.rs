@@ -112,6 +112,9 @@ impl Grouping<'_> {
         }
         for (i, j) in combinations(pair) {
             let approach = deepest::approach(pair, i, j);
+            if pair.is_covered(&approach.meeting) {
+                continue;
+            }
             let gap = approach.distance - thicknesses(pair, i, j);
             if self.last_resort {
                 // Nothing comes deeper than a coat bears, whatever its speed.

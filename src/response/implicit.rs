@@ -119,6 +119,9 @@ impl Nearby {
     fn add(&mut self, pair: &Pair, motions: &[Motion], h: f64) {
         for (i, j) in combinations(pair) {
             let approach = deepest::approach(pair, i, j);
+            if pair.is_covered(&approach.meeting) {
+                continue;
+            }
             let links = [pair.a.links[i], pair.b.links[j]];
             let arms = links.map(|link| approach.meeting - (motions[link as usize].center - pair.origin));
             let gap = approach.distance - thicknesses(pair, i, j);

@@ -85,6 +85,9 @@ fn demand(pair: &Pair, motions: &[Motion], dt: f64) -> (f64, f64) {
     for i in 0..pair.a.skeletons.len() {
         for j in 0..pair.b.skeletons.len() {
             let approach = deepest::approach(pair, i, j);
+            if pair.is_covered(&approach.meeting) {
+                continue;
+            }
             let speed = closing_speed(pair, i, j, &approach, motions, dt);
             let overlap = pair.a.reach[i] + pair.b.reach[j] - approach.distance;
             if overlap + speed * dt <= 0.0 {

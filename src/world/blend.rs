@@ -1,6 +1,7 @@
 //! Who blends with whom in a body, and which of its parts collide.
 
-use super::{Body, BodyId, LinkId, LogLevel, SkeletonId, World};
+use super::step::Stepping;
+use super::{Body, BodyId, LinkId, LogLevel, SkeletonId, World, sleep};
 use crate::coat::cliques::{self, Block, Weights};
 use crate::error::{Error, Result, require};
 use crate::field::Graph;
@@ -88,6 +89,7 @@ impl World {
         require("weight", weight, "from 0 to 1", |x| (0.0..=1.0).contains(&x))?;
         require("duration", duration, "finite and at least 0 s", |x| x >= 0.0)?;
         let now = self.blend(a, b)?;
+        self.check_targets(a, b, weight)?;
         self.change_blending(self.body_of_pair(a, b)?, |blending| {
             let pair = blending.pair_mut(ordered(a, b));
             let rate = (weight - now).abs() / duration;
@@ -97,6 +99,15 @@ impl World {
                 (weight, 0.0, Some(weight))
             };
         })
+    }
+
+    /// Refuses a weight that cannot be reached with all others that are on their way.
+    fn check_targets(&self, a: SkeletonId, b: SkeletonId, weight: f64) -> Result<()> {
+        let body = self.body_of_pair(a, b)?;
+        let mut goal = self.bodies[body].blending.as_deref().cloned().unwrap_or_default();
+        goal.pairs.iter_mut().filter(|pair| pair.rate > 0.0).for_each(|pair| pair.weight = Some(pair.target));
+        goal.pair_mut(ordered(a, b)).weight = Some(weight);
+        self.compile(body, &mut goal)
     }
 
     /// How much two skeletons of a body blend now.
@@ -208,7 +219,7 @@ impl World {
     }
 
     /// Moves the weights that are on their way.
-    pub(super) fn ramp_blends(&mut self, dt: f64) {
+    pub(super) fn ramp_blends(&mut self, state: &Stepping, dt: f64) {
         for slot in 0..self.bodies.capacity() {
             let Some(Body { blending: Some(blending), .. }) = self.bodies.at_mut(slot) else { continue };
             if !blending.is_ramping() {
@@ -223,7 +234,8 @@ impl World {
                     pair.rate = if arrives { 0.0 } else { pair.rate };
                 }
             }
-            self.rouse(slot as u32);
+            // Who leans on it, too.
+            sleep::rouse(&mut self.bodies, &state.resting, slot as u32);
             self.unsettle(slot);
             self.measure(slot);
         }

@@ -177,6 +177,13 @@ impl World {
         if desc != self.desc {
             self.rouse_all();
         }
+        if desc.seed_count != self.desc.seed_count {
+            for skeleton in 0..self.skeletons.capacity() {
+                if let Some(skeleton) = self.skeletons.at_mut(skeleton) {
+                    skeleton.rays = Default::default();
+                }
+            }
+        }
         self.desc = desc;
         if changes {
             for index in 0..self.bodies.capacity() {

@@ -459,6 +459,9 @@ impl World {
                 require("weight", *weight, "from 0 to 1", |x| (0.0..=1.0).contains(&x))
                     .map_err(|error| refused(format_args!("blend graph of body {body}"), error))?;
             }
+            if *rate > 0.0 && weight.is_none() {
+                return refuse("a weight on its way from nowhere");
+            }
             require("rate of a weight", *rate, "finite and at least 0", |x| x >= 0.0)
                 .map_err(|error| refused(format_args!("blend graph of body {body}"), error))?;
         }
@@ -553,6 +556,9 @@ impl World {
 
     /// Takes over the rays of skeletons that are the same: to roll back is not to make them again.
     fn take_rays_of(&mut self, other: &mut World) {
+        if self.desc.seed_count != other.desc.seed_count {
+            return;
+        }
         for index in 0..self.skeletons.capacity() {
             if let (Some(ours), Some(theirs)) = (self.skeletons.at_mut(index), other.skeletons.at_mut(index))
                 && same_bits(&ours.desc, &theirs.desc)

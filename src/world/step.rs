@@ -11,7 +11,8 @@ use crate::clock::Clock;
 use crate::coat::cliques::Block;
 use crate::contact::broad_phase::{self, Bounds};
 use crate::contact::candidate::{Candidate, Kept, Memory};
-use crate::contact::{pair::Side, surface};
+use crate::contact::pair::{Pair, Side};
+use crate::contact::surface;
 use crate::error::{Result, require};
 use crate::math::{Quat, Vec3, Wrench};
 use crate::response::Response;
@@ -209,7 +210,7 @@ impl World {
     fn run(&mut self, state: &mut Stepping, dt: f64, team: &Team) {
         let timed = self.desc.timed;
         let (mut whole, mut clock, mut times) = (Clock::start(timed), Clock::start(timed), Times::default());
-        self.ramp_blends(dt);
+        self.ramp_blends(state, dt);
         self.control_volumes(state, team);
         self.begin(state, dt);
         clock.lap(&mut times.begin);
@@ -315,7 +316,7 @@ impl World {
         team.each_mut(&mut state.candidates, FILLED, |_, candidate| {
             let [a, b] = candidate.bodies;
             candidate.close = if a == b {
-                self.fill_block(candidate, motions, dt)
+                self.fill_block(candidate, motions, dt) && !self.are_fixed(&candidate.pair)
             } else {
                 let bounds = [a, b].map(|body| &bounds[bounds_of[body as usize]]);
                 self.fill(candidate, motions, bounds, dt)
@@ -326,6 +327,12 @@ impl World {
         for candidate in state.candidates.extract_if(.., |candidate| !candidate.close) {
             state.previous.push(candidate);
         }
+    }
+
+    /// Whether nothing of a pair can ever move.
+    fn are_fixed(&self, pair: &Pair) -> bool {
+        let mut links = pair.a.links.iter().chain(&pair.b.links);
+        links.all(|link| self.links[*link as usize].desc.kind == Kind::Fixed)
     }
 
     /// What may meet: pairs of bodies, and of parts that collide of one body, in order.
