@@ -1,7 +1,7 @@
 //! From contact surfaces to groups: what each candidate brings into the system of an
 //! [implicit step](super::implicit), as points that press and rub on the links that carry them.
 
-use super::coupled::{Grip, Group, Member, Point};
+use super::group::{Grip, Group, Member, Point};
 use super::substep::PUSH_OUT;
 use crate::base::{Inertia, Motion};
 use crate::contact::candidate::Candidate;

@@ -6,8 +6,9 @@
 //! velocities ([`coupled`](super::coupled)). When the two do not agree after a few rounds, the step is taken in two
 //! halves. Frozen at the first pose, stiff contacts would gain energy and rolling would be braked.
 
-use super::coupled::{Coupled, Group, Member, Point, Push, put_twist, twist_of};
+use super::coupled::{Coupled, put_twist, twist_of};
 use super::envelope::{BLOCK, OrderBuffers, narrow_order};
+use super::group::{Group, Member, Point, Push};
 use super::grouping::{Bundle, CREEP, Grouping, RECOVERY, combinations, thicknesses, thinner};
 use super::springs::{self, Tie};
 use super::substep::{Island, Step, bend_bristles, drift};

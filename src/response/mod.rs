@@ -4,6 +4,7 @@ pub mod conjugate;
 pub mod coupled;
 pub mod envelope;
 pub mod explicit;
+pub mod group;
 pub mod grouping;
 pub mod implicit;
 pub mod mirror;

@@ -1,6 +1,6 @@
 //! Springs in a sub-step, how many sub-steps they ask for, and springs in an implicit step.
 
-use super::coupled::Member;
+use super::group::Member;
 use crate::base::springs::{Law, Line, Spring, direction};
 use crate::base::{Inertia, Motion};
 use crate::math::{Mat3, Vec3, Wrench};
