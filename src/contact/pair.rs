@@ -212,9 +212,9 @@ impl Pair {
 
     /// The cover that is the highest at a point, if it rises above the isovalue.
     fn highest_cover(&self, p: &Vec3) -> Option<&Cover> {
-        let height = |cover: &&Cover| cover.weight * cover.skeleton.value(p);
-        let highest = self.covers.iter().max_by(|a, b| height(a).total_cmp(&height(b)))?;
-        (height(&highest) > self.a.isovalue).then_some(highest)
+        let heights = self.covers.iter().map(|cover| (cover.weight * cover.skeleton.value(p), cover));
+        let risen = heights.filter(|(height, _)| *height > self.a.isovalue);
+        risen.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, cover)| cover)
     }
 
     /// Whether a point lies in the territory of one that blends with both sides, so that these don't touch there,

@@ -141,7 +141,9 @@ impl Deformed {
             let (height, rise) = obstacle.bulge.value_slope(gap.0);
             let bulge = (height, gap.1 * rise);
             bulges = (bulges.0 + bulge.0, bulges.1 + bulge.1);
-            near.push(Near { bulge, room: room(obstacle, &gap, &bulge, &(beta, slope)) });
+            if self.obstacles.len() > 1 {
+                near.push(Near { bulge, room: room(obstacle, &gap, &bulge, &(beta, slope)) });
+            }
         }
         if touching || bulges.0 <= 0.0 {
             return compression;

@@ -89,25 +89,13 @@ impl World {
         require("weight", weight, "from 0 to 1", |x| (0.0..=1.0).contains(&x))?;
         require("duration", duration, "finite and at least 0 s", |x| x >= 0.0)?;
         let now = self.blend(a, b)?;
-        self.check_targets(a, b, weight)?;
+        let rate = (weight - now).abs() / duration;
+        let ramps = duration > 0.0 && rate > 0.0 && rate.is_finite();
         self.change_blending(self.body_of_pair(a, b)?, |blending| {
             let pair = blending.pair_mut(ordered(a, b));
-            let rate = (weight - now).abs() / duration;
-            (pair.target, pair.rate, pair.weight) = if duration > 0.0 && rate > 0.0 && rate.is_finite() {
-                (weight, rate, Some(now))
-            } else {
-                (weight, 0.0, Some(weight))
-            };
+            (pair.target, pair.rate, pair.weight) =
+                if ramps { (weight, rate, Some(now)) } else { (weight, 0.0, Some(weight)) };
         })
-    }
-
-    /// Refuses a weight that cannot be reached with all others that are on their way.
-    fn check_targets(&self, a: SkeletonId, b: SkeletonId, weight: f64) -> Result<()> {
-        let body = self.body_of_pair(a, b)?;
-        let mut goal = self.bodies[body].blending.as_deref().cloned().unwrap_or_default();
-        goal.pairs.iter_mut().filter(|pair| pair.rate > 0.0).for_each(|pair| pair.weight = Some(pair.target));
-        goal.pair_mut(ordered(a, b)).weight = Some(weight);
-        self.compile(body, &mut goal)
     }
 
     /// How much two skeletons of a body blend now.
@@ -155,25 +143,31 @@ impl World {
     }
 
     fn body_of_pair(&self, a: SkeletonId, b: SkeletonId) -> Result<usize> {
-        let bodies = [a, b].map(|id| Ok(self.links[self.skeletons.get(id)?.link as usize].body));
-        let [a_body, b_body] = bodies;
-        let (a_body, b_body): (u32, u32) = (a_body?, b_body?);
+        let body_of = |id| Ok(self.links[self.skeletons.get(id)?.link as usize].body);
+        let (body, other) = (body_of(a)?, body_of(b)?);
         if a == b {
             return Err(Error::Unsupported("a skeleton blends with itself, always"));
         }
-        if a_body != b_body {
+        if body != other {
             return Err(Error::Unsupported("skeletons of two bodies don't blend"));
         }
-        Ok(a_body as usize)
+        Ok(body as usize)
     }
 
-    /// Changes a body's graph, or nothing when the change is refused.
+    /// Changes a body's graph, or nothing when it cannot be, or when what it is on its way to cannot be.
     fn change_blending(&mut self, body: usize, change: impl FnOnce(&mut Blending)) -> Result<()> {
         let mut changed = self.bodies[body].blending.as_deref().cloned().unwrap_or_default();
         change(&mut changed);
         self.compile(body, &mut changed)?;
+        if changed.is_ramping() {
+            let mut goal = changed.clone();
+            goal.pairs.iter_mut().filter(|pair| pair.rate > 0.0).for_each(|pair| pair.weight = Some(pair.target));
+            self.compile(body, &mut goal)?;
+        }
         self.bodies[body].blending = Some(Box::new(changed)).filter(|blending| !blending.is_idle());
-        self.refresh(body);
+        self.rouse(body as u32);
+        self.unsettle(body);
+        self.measure_reach(body);
         Ok(())
     }
 
@@ -237,7 +231,8 @@ impl World {
             // Who leans on it, too.
             sleep::rouse(&mut self.bodies, &state.resting, slot as u32);
             self.unsettle(slot);
-            self.measure(slot);
+            self.compile_blending(slot);
+            self.measure_reach(slot);
         }
     }
 }
