@@ -12,6 +12,7 @@
 //! - [`coat`]: the implicit layer of one body: seeds and territories;
 //! - [`contact`]: where two coats meet, with what pressure, friction and dissipation;
 //! - [`response`]: how the forces move links, and what the host is told;
+//! - [`substance`]: bodies of particles that fall to pieces and fuse;
 //! - [`surface`]: rays and closest points on a coat;
 //! - [`world`]: the nouns, the step, the queries;
 //! - [`capi`]: the same for C.
@@ -26,6 +27,7 @@ pub mod field;
 pub mod handle;
 pub mod math;
 pub mod response;
+pub mod substance;
 pub mod surface;
 pub mod team;
 pub mod world;

@@ -237,6 +237,8 @@ pub struct isocoat_times {
     pub solve: f64,
     /// Handing back poses and impulses, contacts and events; falling asleep.
     pub report: f64,
+    /// Particles of substances, and the volumes of their coats.
+    pub substances: f64,
 }
 
 // SAFETY: `repr(C)`, the size first, integers and doubles only.
@@ -251,8 +253,8 @@ unsafe impl Descriptor for isocoat_times {
 
 impl From<Times> for isocoat_times {
     fn from(times: Times) -> Self {
-        let Times { step, begin, pairs, islands, respond, contact, solve, report } = times;
-        Self { struct_size: 0, reserved: 0, step, begin, pairs, islands, respond, contact, solve, report }
+        let Times { step, begin, pairs, islands, substances, respond, contact, solve, report } = times;
+        Self { struct_size: 0, reserved: 0, step, begin, pairs, islands, respond, contact, solve, report, substances }
     }
 }
 

@@ -25,6 +25,10 @@ pub struct Graph {
     starts: Vec<u32>,
     /// For each skeleton of each level, its cliques in ascending order.
     cliques: Vec<u32>,
+    /// For the particles of a substance, in place of all the above: those of one label add up.
+    labels: Vec<u32>,
+    /// Pairs of different labels that blend a little, in order, and how much.
+    bonds: Vec<([u32; 2], f64)>,
 }
 
 /// Edges of at least a certain weight.
@@ -80,6 +84,8 @@ impl Clone for Graph {
         self.levels.clone_from(&from.levels);
         self.starts.clone_from(&from.starts);
         self.cliques.clone_from(&from.cliques);
+        self.labels.clone_from(&from.labels);
+        self.bonds.clone_from(&from.bonds);
     }
 }
 
@@ -91,7 +97,24 @@ impl Graph {
 
     /// Whether all skeletons add up.
     pub fn is_complete(&self) -> bool {
-        self.levels.is_empty()
+        self.levels.is_empty() && self.labels.is_empty()
+    }
+
+    /// Makes it the graph of a substance: those of one label blend, and two of different labels as far as their bond says;
+    /// `bonds` in order, each pair in ascending order (docs/model.md, "Separation and fusion").
+    pub fn set_pieces(&mut self, labels: impl Iterator<Item = u32>, bonds: impl Iterator<Item = ([u32; 2], f64)>) {
+        self.clear();
+        self.labels.extend(labels);
+        self.bonds.extend(bonds);
+        self.forget_one_piece();
+    }
+
+    /// One label, and all add up.
+    fn forget_one_piece(&mut self) {
+        if self.labels.iter().all(|label| *label == self.labels[0]) {
+            self.labels.clear();
+            self.bonds.clear();
+        }
     }
 
     /// How far the field may be above the sum of all fields.
@@ -104,6 +127,8 @@ impl Graph {
         self.levels.clear();
         self.starts.clear();
         self.cliques.clear();
+        self.labels.clear();
+        self.bonds.clear();
     }
 
     /// Adds a graph with this share of the field; `cliques_of` lists for each skeleton its cliques, which are less than
@@ -143,9 +168,16 @@ impl Graph {
         largest
     }
 
-    /// The graph of some of the skeletons, by their positions here: where only these reach, the field is the same.
+    /// The graph of some of the skeletons, by their positions here in ascending order: where only these reach, the field is the same.
     pub fn restrict(&self, skeletons: &[u32], out: &mut Graph) {
         out.clear();
+        if !self.labels.is_empty() {
+            out.labels.extend(skeletons.iter().map(|skeleton| self.labels[*skeleton as usize]));
+            let place = |end: u32| skeletons.binary_search(&end).ok().map(|place| place as u32);
+            let bond = |(pair, weight): &([u32; 2], f64)| Some(([place(pair[0])?, place(pair[1])?], *weight));
+            out.bonds.extend(self.bonds.iter().filter_map(bond));
+            return out.forget_one_piece();
+        }
         out.band = self.band;
         let mut apart = false;
         for (level, Level { share, count }) in self.levels.iter().enumerate() {
@@ -187,6 +219,9 @@ impl Graph {
         work.slopes.resize(active.len(), 0.0);
         work.bends.clear();
         work.bends.resize(if order == Order::Bends { active.len() * active.len() } else { 0 }, 0.0);
+        if !self.labels.is_empty() {
+            return self.combine_pieces(active, order, work);
+        }
         let mut value = 0.0;
         for (level, Level { share, count }) in self.levels.iter().enumerate() {
             value += share * self.combine_level(level, *count as usize, active, work);
@@ -209,6 +244,71 @@ impl Graph {
                     *bend += share / *band * (both - product / top.len() as f64);
                 }
             }
+        }
+        value
+    }
+
+    /// `f_A + Q / f_A`, where A has the most field and `Q` is the sum of `b_ij f_i f_j` over `i` in A and `j` elsewhere:
+    /// `f_A + f_B` where all bonds are 1, the larger of the two where all are 0, and continuous in between.
+    fn combine_pieces(&self, active: &[Active], order: Order, work: &mut Workspace) -> f64 {
+        let Workspace { slopes, bends, top, against, .. } = work;
+        top.clear();
+        for (skeleton, value) in active {
+            let label = self.labels[*skeleton];
+            match top.iter_mut().find(|(other, _)| *other == label) {
+                Some((_, sum)) => *sum += value,
+                None => top.push((label, *value)),
+            }
+        }
+        let most = top.iter().copied().reduce(|most, next| if next.1 > most.1 { next } else { most });
+        let Some((label, sum)) = most else { return 0.0 };
+        let is_own = |place: usize| self.labels[active[place].0] == label;
+        // What each of A gets through its bonds, and each of the others.
+        against.clear();
+        against.resize(active.len(), 0.0);
+        let mut product = 0.0;
+        let each_bond = |tell: &mut dyn FnMut(usize, usize, f64)| {
+            for i in (0..active.len()).filter(|i| !self.bonds.is_empty() && is_own(*i)) {
+                for j in (0..active.len()).filter(|j| !is_own(*j)) {
+                    let (a, b) = (active[i].0 as u32, active[j].0 as u32);
+                    let bond = self.bonds.binary_search_by_key(&[a.min(b), a.max(b)], |(pair, _)| *pair);
+                    if let Ok(at) = bond {
+                        tell(i, j, self.bonds[at].1);
+                    }
+                }
+            }
+        };
+        each_bond(&mut |i, j, weight| {
+            against[i] += weight * active[j].1;
+            against[j] += weight * active[i].1;
+            product += weight * active[i].1 * active[j].1;
+        });
+        let value = sum + product / sum;
+        if order == Order::Value {
+            return value;
+        }
+        for (place, slope) in slopes.iter_mut().enumerate() {
+            *slope = against[place] / sum + if is_own(place) { 1.0 - product / (sum * sum) } else { 0.0 };
+        }
+        if order == Order::Bends && product > 0.0 {
+            let count = active.len();
+            for (at, bend) in bends.iter_mut().enumerate() {
+                let (i, j) = (at / count, at % count);
+                let square = sum * sum;
+                if is_own(i) {
+                    *bend -= against[j] / square;
+                }
+                if is_own(j) {
+                    *bend -= against[i] / square;
+                }
+                if is_own(i) && is_own(j) {
+                    *bend += 2.0 * product / (square * sum);
+                }
+            }
+            each_bond(&mut |i, j, weight| {
+                bends[i * count + j] += weight / sum;
+                bends[j * count + i] += weight / sum;
+            });
         }
         value
     }

@@ -38,6 +38,12 @@ impl World {
             if let Some(blending) = &body.blending {
                 self.check_blending(index, blending)?;
             }
+            if let Some(substance) = &body.substance {
+                if body.desc.rigid || !body.links.is_empty() {
+                    return Err(Error::Snapshot(format!("body {index}: a substance that is rigid or has links")));
+                }
+                substance.check().map_err(|error| refused(format_args!("substance of body {index}"), error))?;
+            }
         }
         for index in self.links.indices() {
             check_link(&self.links[index]).map_err(|error| refused(format_args!("link {index}"), error))?;
@@ -187,6 +193,7 @@ fn check_link(link: &Link) -> Result<()> {
         applied_impulse,
         contact_impulse,
         host_impulse,
+        substance_impulse,
         last_dt,
         mirror,
     } = link;
@@ -196,6 +203,7 @@ fn check_link(link: &Link) -> Result<()> {
         ("applied impulse", applied_impulse),
         ("contact impulse", contact_impulse),
         ("impulse for the host", host_impulse),
+        ("impulse of substances", substance_impulse),
     ] {
         require_finite(what, &wrench.force)?;
         require_finite(what, &wrench.torque)?;

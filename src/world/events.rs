@@ -98,6 +98,8 @@ pub struct Times {
     pub pairs: f64,
     /// Groups of bodies that are stepped together.
     pub islands: f64,
+    /// Particles of substances, and the volumes of their coats.
+    pub substances: f64,
     /// Forces and motion: the response of every island.
     pub respond: f64,
     /// Of that, contact surfaces; added up over workers where islands are stepped side by side.

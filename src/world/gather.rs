@@ -93,7 +93,7 @@ impl World {
         true
     }
 
-    fn fill_side(&self, side: &mut Side, body: &Body, motions: &[Motion], region: &(Vec3, Vec3), dt: f64) {
+    pub(super) fn fill_side(&self, side: &mut Side, body: &Body, motions: &[Motion], region: &(Vec3, Vec3), dt: f64) {
         side.begin(body);
         for (position, part) in self.skeletons_of(body).enumerate() {
             if self.is_within(&part, motions, region, dt) {
@@ -251,7 +251,7 @@ fn is_above(shape: &Shape, pose: &Pose, reach: f64, region: &(Vec3, Vec3)) -> bo
 }
 
 /// What two bodies make of their surfaces (the rules are those of [`BodyDesc`](super::BodyDesc)).
-fn material(a: &Body, b: &Body) -> Material {
+pub(super) fn material(a: &Body, b: &Body) -> Material {
     let (scales, dissipations) = ([a.stiffness_scale, b.stiffness_scale], [a.dissipation, b.dissipation]);
     let (a, b) = (&a.desc, &b.desc);
     let mean = |x: f64, y: f64| (x * y).sqrt();

@@ -18,6 +18,7 @@ mod sleep;
 mod snapshot;
 mod springs;
 mod step;
+mod substance;
 mod units;
 mod volume;
 
@@ -30,6 +31,7 @@ pub use desc::{
 pub use events::{Contact, Counters, Event, EventKind, LogLevel, Tally, Times};
 pub use motion::LinkState;
 pub use springs::{Spring, SpringState};
+pub use substance::{Change, Fill, Particle, ParticleId, Piece, SubstanceDesc};
 
 use crate::base::link::Kind;
 use crate::error::{Error, Result};
@@ -55,6 +57,8 @@ pub struct Body {
     /// Who blends with whom, unless all do.
     blending: Option<Box<blend::Blending>>,
     sleep: sleep::Sleep,
+    /// Only of a substance.
+    pub(crate) substance: Option<Box<crate::substance::Substance>>,
     /// Only with volume control.
     volume: Option<Box<volume::Control>>,
 }
@@ -73,6 +77,8 @@ pub struct Link {
     pub(crate) contact_impulse: Wrench,
     /// What the host is to apply to a host-driven link after the last step, about the centre of mass.
     pub(crate) host_impulse: Wrench,
+    /// Of that, the impulse of substances.
+    pub(crate) substance_impulse: Wrench,
     /// Length of the last step.
     pub(crate) last_dt: f64,
     pub(crate) mirror: Mirror,
@@ -219,6 +225,7 @@ impl World {
             units: units::Said::default(),
             blending: None,
             sleep: sleep::Sleep::default(),
+            substance: None,
             volume: None,
         })
     }
@@ -252,6 +259,9 @@ impl World {
     pub fn set_body_desc(&mut self, id: BodyId, desc: BodyDesc) -> Result<()> {
         desc.validate()?;
         let body = self.bodies.get(id)?;
+        if desc.rigid && body.substance.is_some() {
+            return Err(Error::Unsupported("a substance cannot be rigid"));
+        }
         let skeletons = || body.links.iter().flat_map(|link| &self.links[*link as usize].skeletons);
         if desc.isovalue != body.desc.isovalue {
             for skeleton in skeletons() {
@@ -299,7 +309,9 @@ impl World {
     /// Creates a link of a body.
     pub fn create_link(&mut self, body: BodyId, mut desc: LinkDesc) -> Result<LinkId> {
         desc.validate()?;
-        self.bodies.get(body)?;
+        if self.bodies.get(body)?.substance.is_some() {
+            return Err(Error::Unsupported("a substance has particles in place of links"));
+        }
         desc.pose.rotation.renormalize();
         let id = self.links.insert(Link {
             desc,
@@ -310,6 +322,7 @@ impl World {
             applied_impulse: Wrench::default(),
             contact_impulse: Wrench::default(),
             host_impulse: Wrench::default(),
+            substance_impulse: Wrench::default(),
             last_dt: 0.0,
             mirror: Mirror::default(),
         })?;

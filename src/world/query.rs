@@ -71,8 +71,10 @@ impl PosedCoat {
 impl World {
     /// The enabled skeletons of a body at the present poses, in a frame at its first link.
     pub(super) fn posed_coat(&self, body: usize) -> PosedCoat {
-        let first = self.bodies[body].links.first();
-        self.posed_coat_in(body, first.map_or(Vec3::zeros(), |link| self.links[*link as usize].desc.pose.position))
+        let Body { links, substance, .. } = &self.bodies[body];
+        let link = links.first().map(|link| self.links[*link as usize].desc.pose.position);
+        let particle = substance.as_ref().and_then(|substance| Some(substance.particles.first()?.position));
+        self.posed_coat_in(body, link.or(particle).unwrap_or_else(Vec3::zeros))
     }
 
     /// The same in a frame at `origin`.
@@ -102,6 +104,9 @@ impl World {
                 }
             }
         }
+        if let Some(substance) = &body.substance {
+            return self.fill_particles(body, substance, coat);
+        }
         match &body.blending {
             Some(blending) => coat.graph.clone_from(&blending.graph),
             None => coat.graph.clear(),
@@ -116,7 +121,9 @@ impl World {
         })
     }
 
-    fn skeleton_and_link(&self, index: usize) -> (SkeletonId, LinkId) {
+    /// What a part of a coat belongs to; a particle to neither.
+    fn skeleton_and_link(&self, skeletons: &[usize], part: usize) -> (SkeletonId, LinkId) {
+        let Some(&index) = skeletons.get(part) else { return Default::default() };
         (self.skeletons.id_of(index), self.links.id_of(self.skeletons[index].link as usize))
     }
 
@@ -220,7 +227,7 @@ impl World {
             let Some(hit) = hit else { continue };
             if first.is_none() || hit.distance < length {
                 length = hit.distance;
-                let (skeleton, link) = self.skeleton_and_link(posed.skeletons[hit.skeleton]);
+                let (skeleton, link) = self.skeleton_and_link(&posed.skeletons, hit.skeleton);
                 first = Some(RayHit {
                     body: self.bodies.id_of(body),
                     link,
@@ -270,7 +277,7 @@ impl World {
         let (deformed, skeletons) = self.deformed_coat(body.index(), deformation);
         let origin = deformed.coat.origin;
         Ok(deformed.closest(&(point - origin)).map(|SurfaceHit { distance, position, normal, skeleton }| {
-            let (skeleton, link) = self.skeleton_and_link(skeletons[skeleton]);
+            let (skeleton, link) = self.skeleton_and_link(&skeletons, skeleton);
             SurfacePoint { position: position + origin, normal, distance, link, skeleton }
         }))
     }

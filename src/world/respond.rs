@@ -258,6 +258,7 @@ impl World {
             counters.by_scheme.merge(&unlocked(worker).work.tally);
         }
         counters.evaluations = counters.by_scheme.total();
+        counters.substeps = counters.substeps.max(state.system.substeps);
         state.counters = counters;
         if short > 1.0
             && let Some(log) = self.log.get_mut()

@@ -33,10 +33,11 @@ use crate::handle::{Arena, Id, Noun, RawId, Slot, WorldTag};
 use crate::math::{Pose, Twist, Wrench};
 use crate::response::mirror::Mirror;
 use crate::response::{Response, VelocityConvention};
+use crate::substance::{Bond, Particle, ParticleId, ParticleSlot, Substance, SubstanceDesc};
 use crate::team::Alone;
 
 /// What the lists below say. Another number is refused: no snapshot is ever half understood.
-const FORMAT: u32 = 3;
+const FORMAT: u32 = 4;
 const MAGIC: [u8; 8] = *b"isocoat\0";
 /// Offsets of the parts of the header.
 const FORMAT_AT: usize = 8;
@@ -74,7 +75,7 @@ structs! {
     SpringDesc { links, points, rest_length, stiffness, damping, user_data }
     // What the descriptor comes to follows from the parts.
     Body {
-        desc, links, springs, enabled, stacked, units, blending, sleep;
+        desc, links, springs, enabled, stacked, units, blending, sleep, substance;
         stiffness_scale: 0.0, dissipation: 0.0, volume: None
     }
     Blending {
@@ -83,8 +84,18 @@ structs! {
     }
     Pairing { skeletons, weight, target, rate, apart }
     Link {
-        desc, body, skeletons, enabled, applied_force, applied_impulse, contact_impulse, host_impulse, last_dt, mirror,
+        desc, body, skeletons, enabled, applied_force, applied_impulse, contact_impulse, host_impulse, substance_impulse,
+        last_dt, mirror,
     }
+    Substance { desc, particles, bonds, next_label, slots, free; changes: Vec::new() }
+    SubstanceDesc {
+        spacing, particle_mass, cohesion, viscosity, damping, fusion_threshold, blend_time, volume_gain, thickness, radius,
+        seed_count,
+    }
+    Particle { id, position, velocity, force, offset, target, volume, label, piece }
+    ParticleId { name }
+    ParticleSlot { generation, place }
+    Bond { pair, weight, holds }
     // The profile and the reach follow from the descriptors; the rays are made at their first use.
     Skeleton { desc, link, enabled, offset, target; profile: NO_PROFILE, reach: 0.0, rays: Default::default() }
     Spring { desc }

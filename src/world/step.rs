@@ -18,6 +18,7 @@ use crate::math::{Quat, Vec3, Wrench};
 use crate::response::Response;
 use crate::response::mirror::Host;
 use crate::response::substep::Island;
+use crate::substance::system::System;
 use crate::team::Team;
 
 /// Candidates that a worker fills in one go.
@@ -34,7 +35,7 @@ pub(crate) struct Stepping {
     pub(super) bounds_of: Vec<usize>,
     pub(super) pairs: Vec<[u32; 2]>,
     /// Bounds of the last step, body by body, and the pairs that meet among them: while nobody moves, nobody else meets.
-    last_bounds: Vec<Bounds>,
+    pub(super) last_bounds: Vec<Bounds>,
     new_bounds: Vec<Bounds>,
     met: Vec<[u32; 2]>,
     meetings: Vec<Meeting>,
@@ -64,6 +65,8 @@ pub(crate) struct Stepping {
     /// Working memory of each worker; the first always is the thread that steps.
     pub(super) workers: Vec<Mutex<Worker>>,
     pub(super) contacts: Vec<Contact>,
+    pub(super) system: System,
+    pub(super) substance_contacts: Vec<Contact>,
     events: Vec<Event>,
     pub(super) counters: Counters,
     pub(super) times: Times,
@@ -158,6 +161,8 @@ impl Stepping {
             touches: _,
             workers: _,
             contacts,
+            system: _,
+            substance_contacts: _,
             events: _,
             counters: _,
             times: _,
@@ -212,6 +217,7 @@ impl World {
         let (mut whole, mut clock, mut times) = (Clock::start(timed), Clock::start(timed), Times::default());
         self.ramp_blends(state, dt);
         self.control_volumes(state, team);
+        self.wake_near_substances(state, dt);
         self.begin(state, dt);
         clock.lap(&mut times.begin);
         self.find_candidates(state, dt, team);
@@ -219,6 +225,8 @@ impl World {
         clock.lap(&mut times.pairs);
         self.group(state);
         clock.lap(&mut times.islands);
+        self.step_substances(state, dt, team);
+        clock.lap(&mut times.substances);
         self.respond(state, dt, team);
         clock.lap(&mut times.respond);
         self.finish(state, dt);
@@ -557,6 +565,7 @@ impl World {
             memory.was_overloaded = overloaded || memory.overloaded && touching;
             memory.overloaded = false;
         }
+        state.contacts.extend_from_slice(&state.substance_contacts);
         state.counters.patches = state.contacts.len() as u32;
     }
 

@@ -1,0 +1,117 @@
+//! Who is near whom, in O(n): a grid of cells as wide as the reach, kept as particles sorted by cell.
+
+use crate::math::Vec3;
+
+/// Cells along an axis: what lies farther out shares the last one.
+const CELLS: i64 = 1 << 21;
+
+/// For each particle, the others within a reach.
+#[derive(Debug, Default)]
+pub struct Neighbours {
+    starts: Vec<u32>,
+    lists: Vec<u32>,
+    /// Cell and particle, in order.
+    cells: Vec<(u64, u32)>,
+}
+
+/// The cell of a point, row by row along `x`.
+fn key(cell: [i64; 3]) -> u64 {
+    (cell[2] as u64) << 42 | (cell[1] as u64) << 21 | cell[0] as u64
+}
+
+impl Neighbours {
+    /// Finds all pairs up to `reach` apart.
+    pub fn find(&mut self, points: &[Vec3], reach: f64) {
+        let Self { starts, lists, cells } = self;
+        let low = points.iter().fold(Vec3::repeat(f64::INFINITY), |low, p| low.inf(p));
+        let cell_of = |p: &Vec3| {
+            let at = (p - low) / reach;
+            [at.x, at.y, at.z].map(|x| (x as i64).clamp(0, CELLS - 1))
+        };
+        cells.clear();
+        cells.extend(points.iter().enumerate().map(|(index, p)| (key(cell_of(p)), index as u32)));
+        cells.sort_unstable();
+        starts.clear();
+        starts.resize(points.len() + 1, 0);
+        lists.clear();
+        // The particles of a cell share their nine rows of cells; lists are made in the order of cells, then put in order.
+        let mut made: Vec<(u32, u32, u32)> = Vec::with_capacity(points.len());
+        let mut rows = [(0, 0); 9];
+        let mut first = 0;
+        while first < cells.len() {
+            let cell = cells[first].0;
+            let last = first + cells[first..].partition_point(|(key, _)| *key == cell);
+            let [x, y, z] = cell_of(&points[cells[first].1 as usize]);
+            for (row, range) in rows.iter_mut().enumerate() {
+                let (y, z) = (y + row as i64 % 3 - 1, z + row as i64 / 3 - 1);
+                *range = if (0..CELLS).contains(&y) && (0..CELLS).contains(&z) {
+                    let from = key([(x - 1).max(0), y, z]);
+                    let to = key([(x + 1).min(CELLS - 1), y, z]);
+                    let begin = cells.partition_point(|(key, _)| *key < from);
+                    (begin, begin + cells[begin..].partition_point(|(key, _)| *key <= to))
+                } else {
+                    (0, 0)
+                };
+            }
+            for (_, index) in &cells[first..last] {
+                let (p, begin) = (points[*index as usize], lists.len() as u32);
+                for (from, to) in rows {
+                    for (_, other) in &cells[from..to] {
+                        if other != index && (points[*other as usize] - p).norm_squared() <= reach * reach {
+                            lists.push(*other);
+                        }
+                    }
+                }
+                made.push((*index, begin, lists.len() as u32));
+            }
+            first = last;
+        }
+        // Lists lie in the order of cells: that of the particles is found by their starts alone.
+        self.places(made);
+    }
+
+    fn places(&mut self, made: Vec<(u32, u32, u32)>) {
+        let mut sorted = Vec::with_capacity(self.lists.len());
+        let mut by_index = made;
+        by_index.sort_unstable();
+        for (index, begin, end) in by_index {
+            self.starts[index as usize] = sorted.len() as u32;
+            sorted.extend_from_slice(&self.lists[begin as usize..end as usize]);
+        }
+        if let Some(last) = self.starts.last_mut() {
+            *last = sorted.len() as u32;
+        }
+        self.lists = sorted;
+    }
+
+    /// The others near a particle.
+    pub fn of(&self, index: usize) -> &[u32] {
+        &self.lists[self.starts[index] as usize..self.starts[index + 1] as usize]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn finds_what_all_pairs_would() {
+        let mut seed = 1_u64;
+        let mut next = || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        let mut points: Vec<Vec3> = (0..400).map(|_| Vec3::new(next(), next(), next() * 0.3)).collect();
+        points.push(Vec3::new(1e9, -1e9, 3.0));
+        points.push(points[7]);
+        let mut near = Neighbours::default();
+        near.find(&points, 0.17);
+        for (i, p) in points.iter().enumerate() {
+            let mut found = near.of(i).to_vec();
+            found.sort_unstable();
+            let is_near = |j: &u32| *j as usize != i && (points[*j as usize] - p).norm() <= 0.17;
+            let expected: Vec<u32> = (0..points.len() as u32).filter(is_near).collect();
+            assert_eq!(found, expected);
+        }
+    }
+}

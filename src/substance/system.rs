@@ -1,0 +1,795 @@
+//! One step of all substances of a world: sub-steps of particles, and of what they touch.
+//!
+//! Velocity Verlet with forces of [`forces`](super::forces) and of [`contact`](super::contact); friction as exact impulses
+//! after each sub-step. A contact is integrated when it has moved by a few percent of the thickness since it was last, and
+//! is a spring in between. Links that can move go along in the sub-steps, with all that is known to act on them; what they
+//! got is handed to the step's response, which then solves everything else.
+
+use std::sync::Arc;
+
+use super::contact::{self, CLOSEST, Opposite, Press, Stiffness};
+use super::forces::{CUT, Law, braked, direction};
+use super::locale::Locale;
+use super::neighbours::Neighbours;
+use crate::base::Motion;
+use crate::contact::pair::Side;
+use crate::contact::press::Material;
+use crate::field::Profile;
+use crate::math::{Vec3, Wrench};
+use crate::team::Team;
+
+/// Motion of a contact after which it is integrated again, over the thickness.
+const STALE: f64 = 0.05;
+/// How much farther than needed neighbours are looked for, over the radius: they are found again after half as much.
+const SKIN: f64 = 0.2;
+/// Farthest that anything may move in a sub-step, over the thickness.
+const STRIDE: f64 = 0.25;
+/// Most particles of which each has the same part of the field somewhere on the surface.
+pub const CROWD: f64 = 8.0;
+/// Contacts or particles that a worker takes at a time.
+const BLOCK: usize = 8;
+
+/// What the particles of one substance have in common.
+#[derive(Clone, Debug)]
+pub struct Matter {
+    /// Slot of the body.
+    pub body: u32,
+    /// Distance at rest \[m\].
+    pub spacing: f64,
+    /// Of one particle \[kg\].
+    pub mass: f64,
+    /// `γ` \[J\].
+    pub cohesion: f64,
+    /// `μ` \[kg/m\].
+    pub viscosity: f64,
+    /// Damping of a pair at rest over the critical one.
+    pub damping: f64,
+    /// Pressure of fusion \[Pa\].
+    pub fusion_threshold: f64,
+    /// The field without an offset.
+    pub profile: Profile,
+    /// No surface is farther from a particle, without offsets: there [`CROWD`] would have to add up \[m\].
+    pub farthest: f64,
+    /// Pressure a unit of field \[Pa\].
+    pub stiffness_scale: f64,
+    /// Between its pieces.
+    pub material: Material,
+    /// Seeds.
+    pub directions: Arc<[Vec3]>,
+}
+
+/// All particles of all substances, as columns; in a frame with the world's axes near them.
+#[derive(Debug, Default)]
+pub struct Swarm {
+    /// Origin of the frame in the world \[m\].
+    pub origin: Vec3,
+    /// Places \[m\].
+    pub place: Vec<Vec3>,
+    /// Velocities \[m/s\].
+    pub velocity: Vec<Vec3>,
+    /// Accelerations from outside \[m/s²\].
+    pub pull: Vec<Vec3>,
+    /// Offsets \[m\].
+    pub offset: Vec<f64>,
+    /// Labels, different for every substance.
+    pub label: Vec<u32>,
+    /// Which matter.
+    pub kind: Vec<u16>,
+    /// Who is near.
+    pub near: Neighbours,
+    /// The substances.
+    pub matters: Vec<Matter>,
+    /// Largest radius of influence, offsets in it \[m\].
+    pub widest: f64,
+    /// Bonds of each particle: where its own begin, and the others with weights.
+    pub bond_starts: Vec<u32>,
+    /// See there.
+    pub bond_lists: Vec<(u32, f64)>,
+}
+
+impl Swarm {
+    /// What a particle is made of.
+    pub fn matter_of(&self, index: usize) -> &Matter {
+        &self.matters[self.kind[index] as usize]
+    }
+
+    /// Those of other labels that a particle blends with, and how much.
+    pub fn bonds_of(&self, index: usize) -> &[(u32, f64)] {
+        if self.bond_lists.is_empty() {
+            return &[];
+        }
+        &self.bond_lists[self.bond_starts[index] as usize..self.bond_starts[index + 1] as usize]
+    }
+
+    /// Whether a particle has any bond.
+    pub fn is_bonded(&self, index: usize) -> bool {
+        !self.bonds_of(index).is_empty()
+    }
+
+    /// How far two particles of different labels blend.
+    pub fn bond(&self, a: usize, b: usize) -> f64 {
+        self.bonds_of(a).iter().find(|(other, _)| *other as usize == b).map_or(0.0, |(_, weight)| *weight)
+    }
+
+    /// Sets the bonds, from pairs with weights.
+    pub fn set_bonds(&mut self, pairs: &[([u32; 2], f64)]) {
+        self.bond_starts.clear();
+        self.bond_lists.clear();
+        if pairs.is_empty() {
+            return;
+        }
+        let mut sided: Vec<(u32, u32, f64)> =
+            pairs.iter().flat_map(|([a, b], w)| [(*a, *b, *w), (*b, *a, *w)]).collect();
+        sided.sort_unstable_by_key(|(a, b, _)| (*a, *b));
+        self.bond_starts.resize(self.place.len() + 1, 0);
+        for (a, ..) in &sided {
+            self.bond_starts[*a as usize + 1] += 1;
+        }
+        for index in 1..self.bond_starts.len() {
+            self.bond_starts[index] += self.bond_starts[index - 1];
+        }
+        self.bond_lists.extend(sided.into_iter().map(|(_, b, w)| (b, w)));
+    }
+
+    /// Finds who is near whom, as far as any two fields reach each other, and a little farther.
+    pub fn find_neighbours(&mut self) {
+        let offset = self.offset.iter().copied().fold(0.0, f64::max);
+        let radius = self.matters.iter().map(|matter| matter.profile.radius).fold(0.0, f64::max);
+        self.widest = radius + offset;
+        self.near.find(&self.place, 2.0 * self.widest + SKIN * radius);
+    }
+}
+
+/// A coat that particles may meet.
+#[derive(Debug, Default)]
+pub struct Obstacle {
+    /// Its skeletons that are near.
+    pub side: Side,
+    /// For each matter, what the two make of their surfaces; none where they do not touch.
+    pub materials: Vec<Option<Material>>,
+}
+
+/// Who presses on a particle.
+#[derive(Clone, Debug)]
+enum Other {
+    /// An obstacle, by its number; the skeletons near the particle, from and to.
+    Obstacle { number: u32, skeletons: (u32, u32) },
+    /// Another piece, by its label, and its nearest particle.
+    Piece { label: u32, nearest: u32 },
+}
+
+/// What may press on a particle, and does so as it did when it was last integrated.
+#[derive(Clone, Debug)]
+struct Load {
+    particle: u32,
+    other: Other,
+    press: Press,
+    /// The particle from the anchor, then.
+    from_anchor: Vec3,
+    /// Motion from there after which it is integrated again \[m\].
+    patience: f64,
+    /// The anchor: in the frame of a link, or the mean of particles with these parts.
+    link: u32,
+    arm: Vec3,
+    carriers: Vec<(u32, f64)>,
+    /// The particle is in too deep: where it is to go.
+    escape: Option<Vec3>,
+    fresh: bool,
+}
+
+/// Buffers of a step, and what it found.
+#[derive(Debug, Default)]
+pub struct System {
+    /// The particles.
+    pub swarm: Swarm,
+    /// What they may touch.
+    pub obstacles: Vec<Obstacle>,
+    /// What each link got, about its centre of mass, by slot \[N s\].
+    pub carried: Vec<Wrench>,
+    /// Pairs of particles that meet under more than their threshold.
+    pub pressed: Vec<[u32; 2]>,
+    /// Sub-steps taken.
+    pub substeps: u32,
+    /// Stiffness was more than the sub-steps could follow, or a particle was pushed out of something.
+    pub overloaded: bool,
+    pairs: Vec<(u32, u32, f64)>,
+    loads: Vec<Load>,
+    near_skeletons: Vec<u32>,
+    built_at: Vec<Vec3>,
+    force: Vec<Vec3>,
+    laws: Vec<Law>,
+    softened: f64,
+    /// The warning was given.
+    pub told: bool,
+    /// The forces are those of the present places.
+    forced: bool,
+}
+
+thread_local! {
+    static LOCALE: std::cell::RefCell<Locale> = std::cell::RefCell::default();
+}
+
+/// Runs `work` with the thread's own locale.
+pub fn with_locale<T>(work: impl FnOnce(&mut Locale) -> T) -> T {
+    LOCALE.with_borrow_mut(work)
+}
+
+impl System {
+    /// For each pair of matter and obstacle that touch: force on the obstacle, its centre, area, highest pressure and
+    /// stiffness.
+    pub fn contacts(&self, motions: &[Motion], mut tell: impl FnMut(u32, &Obstacle, u32, &Press)) {
+        for load in &self.loads {
+            let Other::Obstacle { number, .. } = load.other else { continue };
+            let push = load.now(&self.swarm, motions, self.softened);
+            if push != Vec3::zeros() {
+                let press = Press { push, point: load.anchor(&self.swarm, motions), ..load.press };
+                tell(
+                    self.swarm.matter_of(load.particle as usize).body,
+                    &self.obstacles[number as usize],
+                    load.link,
+                    &press,
+                );
+            }
+        }
+    }
+
+    /// Moves all particles, and the links of obstacles, by `dt`.
+    pub fn advance(&mut self, motions: &mut [Motion], dt: f64, phase: f64, most: u32, team: &Team) {
+        self.carried.clear();
+        self.carried.resize(motions.len(), Wrench::default());
+        self.pressed.clear();
+        (self.substeps, self.overloaded, self.forced) = (0, false, false);
+        let least = dt / f64::from(most);
+        // Nothing of the last step counts, so that a snapshot needs none of it.
+        self.loads.clear();
+        self.laws.clear();
+        for matter in &self.swarm.matters {
+            let most = matter.mass * (2.0 * phase / least).powi(2);
+            let law = Law::new(matter.spacing, matter.cohesion, most);
+            self.overloaded |= law.stiffness(matter.spacing) < 3.9 * matter.cohesion / matter.spacing.powi(2);
+            self.laws.push(law);
+        }
+        self.build(motions);
+        self.refresh(motions, team);
+        let mut left = dt;
+        while left > 0.0 {
+            let wanted = self.stride(motions, phase).max(least);
+            let h = left / (left / wanted * (1.0 - 1e-12)).ceil().max(1.0);
+            let softened = (2.0 * phase / least).powi(2);
+            self.forced &= softened == self.softened;
+            self.softened = softened;
+            self.substep(motions, h, team);
+            self.substeps += 1;
+            left = if left - h > 1e-9 * dt { left - h } else { 0.0 };
+        }
+    }
+
+    /// Neighbours, pairs that attract or repel, and what may come to press, over the motion that the skin allows.
+    fn build(&mut self, motions: &[Motion]) {
+        self.swarm.find_neighbours();
+        self.built_at.clone_from(&self.swarm.place);
+        self.pairs.clear();
+        let swarm = &self.swarm;
+        for i in 0..swarm.place.len() {
+            let matter = swarm.matter_of(i);
+            let reach = CUT * matter.spacing + SKIN * matter.profile.radius;
+            for j in swarm.near.of(i) {
+                let at = *j as usize;
+                if at <= i || swarm.kind[at] != swarm.kind[i] {
+                    continue;
+                }
+                let weight = if swarm.label[at] == swarm.label[i] { 1.0 } else { swarm.bond(i, at) };
+                if weight > 0.0 && (swarm.place[at] - swarm.place[i]).norm_squared() < reach * reach {
+                    self.pairs.push((i as u32, *j, weight));
+                }
+            }
+        }
+        let mut old = std::mem::take(&mut self.loads);
+        self.near_skeletons.clear();
+        self.place_obstacles(motions);
+        let mut fresh = Vec::with_capacity(old.len());
+        for i in 0..self.swarm.place.len() {
+            self.list_obstacles(i, &mut fresh);
+            self.list_pieces(i, &mut fresh);
+        }
+        // Both lists are in the order of particles, then of others.
+        let mut at = 0;
+        for load in &mut fresh {
+            while at < old.len() && old[at].key() < load.key() {
+                at += 1;
+            }
+            if at < old.len() && old[at].key() == load.key() {
+                let other = load.other.clone();
+                std::mem::swap(load, &mut old[at]);
+                load.other = other;
+            }
+        }
+        self.loads = fresh;
+    }
+
+    fn place_obstacles(&mut self, motions: &[Motion]) {
+        let origin = self.swarm.origin;
+        for obstacle in &mut self.obstacles {
+            obstacle.side.place(motions, &origin);
+        }
+    }
+
+    fn list_obstacles(&mut self, i: usize, out: &mut Vec<Load>) {
+        let swarm = &self.swarm;
+        let (p, matter) = (&swarm.place[i], swarm.matter_of(i));
+        let reach = matter.profile.radius + swarm.offset[i] + 2.0 * SKIN * matter.profile.radius;
+        for (number, obstacle) in self.obstacles.iter().enumerate() {
+            if obstacle.materials[swarm.kind[i] as usize].is_none() {
+                continue;
+            }
+            let from = self.near_skeletons.len() as u32;
+            for (index, skeleton) in obstacle.side.skeletons.iter().enumerate() {
+                if skeleton.shape.closest(p).distance < skeleton.profile.radius + reach {
+                    self.near_skeletons.push(index as u32);
+                }
+            }
+            let to = self.near_skeletons.len() as u32;
+            if to > from {
+                let other = Other::Obstacle { number: number as u32, skeletons: (from, to) };
+                out.push(Load::new(i as u32, other));
+            }
+        }
+    }
+
+    fn list_pieces(&self, i: usize, out: &mut Vec<Load>) {
+        let swarm = &self.swarm;
+        let (label, kind) = (swarm.label[i], swarm.kind[i] as usize);
+        let first = out.len();
+        for j in swarm.near.of(i) {
+            let at = *j as usize;
+            // One of the two has it: the lower label.
+            if swarm.label[at] <= label {
+                continue;
+            }
+            let distance = |at: usize| (swarm.place[at] - swarm.place[i]).norm_squared();
+            let (own, other) = (swarm.matters[kind].profile, swarm.matter_of(at).profile);
+            if distance(at) > (own.radius + other.radius + swarm.offset[i] + swarm.offset[at]).powi(2) {
+                continue;
+            }
+            let found = out[first..].iter_mut().find_map(|load| match &mut load.other {
+                Other::Piece { label, nearest } if *label == swarm.label[at] => Some(nearest),
+                _ => None,
+            });
+            match found {
+                Some(nearest) if distance(at) < distance(*nearest as usize) => *nearest = *j,
+                Some(_) => {}
+                None => out.push(Load::new(i as u32, Other::Piece { label: swarm.label[at], nearest: *j })),
+            }
+        }
+        out[first..].sort_by_key(Load::key);
+    }
+
+    /// The longest sub-step that follows what is there.
+    fn stride(&self, motions: &[Motion], phase: f64) -> f64 {
+        let swarm = &self.swarm;
+        let mut rate2: f64 = 0.0;
+        let mut speed: f64 = 0.0;
+        for (i, j, weight) in &self.pairs {
+            let (i, j) = (*i as usize, *j as usize);
+            let (matter, law) = (swarm.matter_of(i), &self.laws[swarm.kind[i] as usize]);
+            let offset = swarm.place[j] - swarm.place[i];
+            let distance = offset.norm();
+            let approach = (swarm.velocity[i] - swarm.velocity[j]).norm();
+            if distance < CUT * matter.spacing {
+                rate2 = rate2.max(weight * law.stiffness(distance) / matter.mass);
+            }
+            speed = speed.max(approach / matter.profile.thickness);
+        }
+        // 2 phase / rate of a pair is phase r_0 sqrt(m / γ) at rest.
+        let mut contact2: f64 = 0.0;
+        let mut sum: (u32, f64) = (u32::MAX, 0.0);
+        for load in &self.loads {
+            let i = load.particle as usize;
+            let matter = swarm.matter_of(i);
+            let mobility = 1.0 / matter.mass + motions.get(load.link as usize).map_or(0.0, Motion::inverse_mass);
+            sum = if sum.0 == load.particle { (sum.0, sum.1) } else { (load.particle, 0.0) };
+            if load.press.stiffness > 0.0 {
+                sum.1 += load.press.stiffness * mobility;
+                contact2 = contact2.max(sum.1);
+            }
+            let closing = (swarm.velocity[i] - self.anchor_velocity(load, motions)).norm();
+            speed = speed.max(closing / matter.profile.thickness);
+        }
+        let pair = 2.0 * phase / rate2.sqrt();
+        let touch = 2.0 * phase / contact2.sqrt();
+        let travel = STRIDE / speed;
+        pair.min(touch).min(travel)
+    }
+
+    fn substep(&mut self, motions: &mut [Motion], h: f64, team: &Team) {
+        if !self.forced {
+            self.forces(motions);
+        }
+        self.kick(motions, 0.5 * h);
+        for i in 0..self.swarm.place.len() {
+            let velocity = self.swarm.velocity[i];
+            self.swarm.place[i] += velocity * h;
+        }
+        for link in self.moving_links() {
+            motions[link as usize].drift(h);
+        }
+        self.refresh(motions, team);
+        self.forces(motions);
+        self.kick(motions, 0.5 * h);
+        self.rub_pairs(h);
+        self.rub_loads(motions, h);
+    }
+
+    /// Links of obstacles, each once.
+    fn moving_links(&self) -> Vec<u32> {
+        let mut links: Vec<u32> =
+            self.obstacles.iter().flat_map(|obstacle| obstacle.side.links.iter().copied()).collect();
+        links.sort_unstable();
+        links.dedup();
+        links
+    }
+
+    /// Forces between particles, and of loads.
+    fn forces(&mut self, motions: &[Motion]) {
+        let Self { swarm, force, laws, pairs, loads, .. } = self;
+        force.clear();
+        force.extend(swarm.pull.iter().enumerate().map(|(i, pull)| pull * swarm.matter_of(i).mass));
+        for (i, j, weight) in &*pairs {
+            let (a, b) = (*i as usize, *j as usize);
+            let offset = swarm.place[b] - swarm.place[a];
+            let law = &laws[swarm.kind[a] as usize];
+            let cut = CUT * swarm.matters[swarm.kind[a] as usize].spacing;
+            if offset.norm_squared() < cut * cut {
+                let (n, distance) = direction(&swarm.place[a], &swarm.place[b], [*i, *j]);
+                let push = n * (weight * law.force(distance));
+                force[a] -= push;
+                force[b] += push;
+            }
+        }
+        for load in &*loads {
+            let push = load.now(swarm, motions, self.softened);
+            force[load.particle as usize] += push;
+            for (carrier, part) in &load.carriers {
+                force[*carrier as usize] -= push * *part;
+            }
+        }
+        self.forced = true;
+    }
+
+    fn kick(&mut self, motions: &mut [Motion], h: f64) {
+        for i in 0..self.swarm.place.len() {
+            let change = self.force[i] * (h / self.swarm.matter_of(i).mass);
+            self.swarm.velocity[i] += change;
+        }
+        for link in self.moving_links() {
+            motions[link as usize].kick(h);
+        }
+        for index in 0..self.loads.len() {
+            let load = &self.loads[index];
+            if load.link != u32::MAX && load.press.push != Vec3::zeros() {
+                let push = load.now(&self.swarm, motions, self.softened) * -h;
+                self.push_link(index, &push, motions);
+            }
+        }
+    }
+
+    /// Gives an impulse to the link of a load, where it presses.
+    fn push_link(&mut self, load: usize, impulse: &Vec3, motions: &mut [Motion]) {
+        let Load { link, arm, .. } = self.loads[load];
+        let motion = &mut motions[link as usize];
+        let mut wrench = Wrench::default();
+        wrench.add_force_at(impulse, &(motion.rotation * arm));
+        let change = motion.answer(&wrench);
+        motion.twist.linear += change.linear;
+        motion.twist.angular += change.angular;
+        self.carried[link as usize].add_scaled(&wrench, 1.0);
+    }
+
+    /// Friction between particles: central, exact over the sub-step, a pair after the other.
+    fn rub_pairs(&mut self, h: f64) {
+        let swarm = &mut self.swarm;
+        for (i, j, weight) in &self.pairs {
+            let (a, b) = (*i as usize, *j as usize);
+            let matter = &swarm.matters[swarm.kind[a] as usize];
+            let offset = swarm.place[b] - swarm.place[a];
+            let cut = CUT * matter.spacing;
+            let square = offset.norm_squared();
+            if square >= cut * cut || matter.viscosity == 0.0 && matter.damping == 0.0 {
+                continue;
+            }
+            let (n, distance) = direction(&swarm.place[a], &swarm.place[b], [*i, *j]);
+            let speed = (swarm.velocity[b] - swarm.velocity[a]).dot(&n);
+            // It fades with the force, so that nobody is braked at the cut.
+            let fade = weight * (1.0 - distance / cut).powi(2) / (1.0 - 1.0 / CUT).powi(2);
+            let reduced = 0.5 * matter.mass;
+            let critical = 2.0 * (4.0 * matter.cohesion * reduced).sqrt() / matter.spacing;
+            let left = braked(speed, fade * matter.damping * critical, fade * matter.viscosity, reduced, h);
+            let change = n * (0.5 * (left - speed));
+            swarm.velocity[a] -= change;
+            swarm.velocity[b] += change;
+        }
+    }
+
+    /// Friction and dissipation of loads, and the way out of where nobody may be.
+    fn rub_loads(&mut self, motions: &mut [Motion], h: f64) {
+        for index in 0..self.loads.len() {
+            let load = &self.loads[index];
+            let i = load.particle as usize;
+            if let Some(way) = load.escape {
+                (self.overloaded, self.forced) = (true, false);
+                let n = way.try_normalize(0.0).unwrap_or_else(Vec3::zeros);
+                let velocity = self.anchor_velocity(load, motions);
+                let into = (self.swarm.velocity[i] - velocity).dot(&n).min(0.0);
+                let mass = self.swarm.matter_of(i).mass;
+                self.swarm.place[i] += way;
+                self.give(index, &(n * (-into * mass)), motions);
+                continue;
+            }
+            let push = load.now(&self.swarm, motions, self.softened);
+            let size = push.norm();
+            if size <= 0.0 {
+                continue;
+            }
+            let n = push / size;
+            let relative = self.swarm.velocity[i] - self.anchor_velocity(load, motions);
+            let (away, mass) = (relative.dot(&n), self.swarm.matter_of(i).mass);
+            let reduced = self.reduced_mass(load, motions, &n, mass);
+            let material = self.material_of(load);
+            // Dissipation makes the push p (1 - d v), which never pulls.
+            let damped = -(material.dissipation * away * size).min(size);
+            let most = away.abs() * reduced / h;
+            let mut impulse = n * (damped.clamp(-most, most) * h);
+            let slide = relative - n * away;
+            let speed = slide.norm();
+            if speed > 0.0 {
+                let still = material.static_friction.max(material.friction);
+                let grip =
+                    if still * size * h >= speed * reduced { speed * reduced } else { material.friction * size * h };
+                impulse -= slide
+                    * ((grip + (material.viscous * load.press.area * speed * h).min(speed * reduced - grip)) / speed);
+            }
+            self.give(index, &impulse, motions);
+        }
+    }
+
+    /// An impulse on the particle of a load, the opposite on what presses.
+    fn give(&mut self, index: usize, impulse: &Vec3, motions: &mut [Motion]) {
+        let load = &self.loads[index];
+        let i = load.particle as usize;
+        let mass = self.swarm.matter_of(i).mass;
+        self.swarm.velocity[i] += impulse / mass;
+        for (carrier, part) in &self.loads[index].carriers {
+            let mass = self.swarm.matter_of(*carrier as usize).mass;
+            self.swarm.velocity[*carrier as usize] -= impulse * (*part / mass);
+        }
+        if self.loads[index].link != u32::MAX {
+            self.push_link(index, &-impulse, motions);
+        }
+    }
+
+    fn reduced_mass(&self, load: &Load, motions: &[Motion], n: &Vec3, mass: f64) -> f64 {
+        let mobility = match motions.get(load.link as usize) {
+            Some(motion) => motion.mobility(&(motion.rotation * load.arm), n),
+            None => {
+                let parts = load.carriers.iter();
+                parts.map(|(j, part)| part * part / self.swarm.matter_of(*j as usize).mass).sum()
+            }
+        };
+        1.0 / (1.0 / mass + mobility)
+    }
+
+    fn material_of(&self, load: &Load) -> Material {
+        let kind = self.swarm.kind[load.particle as usize] as usize;
+        match load.other {
+            Other::Obstacle { number, .. } => {
+                self.obstacles[number as usize].materials[kind].unwrap_or(self.swarm.matters[kind].material)
+            }
+            Other::Piece { .. } => self.swarm.matters[kind].material,
+        }
+    }
+
+    fn anchor_velocity(&self, load: &Load, motions: &[Motion]) -> Vec3 {
+        match motions.get(load.link as usize) {
+            Some(motion) => motion.twist.at(&(motion.rotation * load.arm)),
+            None => load.carriers.iter().map(|(j, part)| self.swarm.velocity[*j as usize] * *part).sum(),
+        }
+    }
+
+    /// Integrates the loads that have moved, and finds neighbours again where these have.
+    fn refresh(&mut self, motions: &[Motion], team: &Team) {
+        let count = self.swarm.place.len();
+        let moved = |i: usize| self.swarm.place[i] - self.built_at[i];
+        let mean = (0..count).map(moved).sum::<Vec3>() / count.max(1) as f64;
+        let skin = 0.5 * SKIN * self.swarm.matters.iter().map(|m| m.profile.radius).fold(f64::INFINITY, f64::min);
+        // Among themselves, what all have moved does not count; against obstacles it does.
+        let strayed =
+            |i: usize| (moved(i) - mean).norm_squared() > skin * skin || moved(i).norm_squared() > 4.0 * skin * skin;
+        if (0..count).any(strayed) {
+            self.build(motions);
+        }
+        self.place_obstacles(motions);
+        let Self { swarm, obstacles, loads, near_skeletons, .. } = self;
+        let (swarm, obstacles, near): (&Swarm, &[Obstacle], &[u32]) = (swarm, obstacles, near_skeletons);
+        team.each_mut(loads, BLOCK, |_, load| {
+            load.escape = None;
+            load.fresh = load.is_stale(swarm, motions);
+            if load.fresh {
+                with_locale(|locale| load.integrate(swarm, obstacles, near, motions, locale));
+            }
+        });
+        self.find_pressed();
+    }
+
+    /// Pairs of particles whose pieces meet under more than both their thresholds.
+    fn find_pressed(&mut self) {
+        let Self { swarm, loads, pressed, .. } = self;
+        for load in loads.iter().filter(|load| load.fresh) {
+            let (i, (peak, place)) = (load.particle as usize, load.press.peak);
+            let Other::Piece { label, nearest } = load.other else { continue };
+            let same = swarm.kind[nearest as usize] == swarm.kind[i];
+            if !same || peak <= swarm.matter_of(i).fusion_threshold || peak <= 0.0 {
+                continue;
+            }
+            with_locale(|locale| {
+                locale.gather(swarm, i, Some(label), f64::INFINITY);
+                let (mut own, mut others) = (Vec::new(), Vec::new());
+                locale.owners_at(&place, |index, _| own.push(index));
+                locale.others_at(&place, |index, _| others.push(index));
+                for a in &own {
+                    pressed.extend(others.iter().map(|b| [*a.min(b), *a.max(b)]));
+                }
+            });
+        }
+        pressed.sort_unstable();
+        pressed.dedup();
+    }
+}
+
+impl Load {
+    fn new(particle: u32, other: Other) -> Self {
+        Self {
+            particle,
+            other,
+            press: Press::default(),
+            from_anchor: Vec3::repeat(f64::NAN),
+            patience: 0.0,
+            link: u32::MAX,
+            arm: Vec3::zeros(),
+            carriers: Vec::new(),
+            escape: None,
+            fresh: false,
+        }
+    }
+
+    fn key(&self) -> (u32, u32, u32) {
+        match self.other {
+            Other::Obstacle { number, .. } => (self.particle, 0, number),
+            Other::Piece { label, .. } => (self.particle, 1, label),
+        }
+    }
+
+    /// Where it is held, in the swarm's frame.
+    fn anchor(&self, swarm: &Swarm, motions: &[Motion]) -> Vec3 {
+        match motions.get(self.link as usize) {
+            Some(motion) => (motion.center - swarm.origin) + motion.rotation * self.arm,
+            None => self.carriers.iter().map(|(j, part)| swarm.place[*j as usize] * *part).sum(),
+        }
+    }
+
+    fn shift(&self, swarm: &Swarm, motions: &[Motion]) -> Vec3 {
+        swarm.place[self.particle as usize] - self.anchor(swarm, motions) - self.from_anchor
+    }
+
+    fn is_stale(&self, swarm: &Swarm, motions: &[Motion]) -> bool {
+        // Not a number before the first time.
+        !(self.shift(swarm, motions).norm_squared() <= self.patience * self.patience)
+    }
+
+    /// The push now; its stiffness is bounded by what a sub-step can follow, `most` over the mass.
+    fn now(&self, swarm: &Swarm, motions: &[Motion], most: f64) -> Vec3 {
+        let Press { push, stiffness, .. } = &self.press;
+        let size = push.norm();
+        if size == 0.0 {
+            return *push;
+        }
+        let n = push / size;
+        let softer = (most * swarm.matter_of(self.particle as usize).mass / stiffness).min(1.0);
+        n * ((size - stiffness * self.shift(swarm, motions).dot(&n)).max(0.0) * softer)
+    }
+
+    fn integrate(
+        &mut self,
+        swarm: &Swarm,
+        obstacles: &[Obstacle],
+        near: &[u32],
+        motions: &[Motion],
+        locale: &mut Locale,
+    ) {
+        let i = self.particle as usize;
+        let (center, matter, offset) = (swarm.place[i], swarm.matter_of(i), swarm.offset[i]);
+        let profile = &matter.profile;
+        let sizes = (profile.isovalue, profile.radius + offset, profile.thickness + offset);
+        let patience = STALE * sizes.2;
+        let (opposite, stiffness, axis, guess) = match &self.other {
+            Other::Obstacle { number, skeletons } => {
+                let side = &obstacles[*number as usize].side;
+                let skeletons = &near[skeletons.0 as usize..skeletons.1 as usize];
+                let distance = |index: &u32| {
+                    let skeleton = &side.skeletons[*index as usize];
+                    skeleton.shape.closest(&center).distance - skeleton.profile.thickness
+                };
+                let nearest = skeletons.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)));
+                let Some(nearest) = nearest else { return };
+                self.link = side.links[*nearest as usize];
+                let closest = side.skeletons[*nearest as usize].shape.closest(&center);
+                let gap = distance(nearest);
+                if gap > sizes.1 + patience {
+                    // Out of reach: not before it has come nearer.
+                    self.rest(swarm, motions, center - closest.normal * gap, gap - sizes.1);
+                    return;
+                }
+                let other = if side.rigid { f64::INFINITY } else { side.stiffness_scale };
+                let opposite = Opposite::Coat(side, skeletons);
+                let (excess, gradient) = opposite.excess(locale, &center);
+                let axis = gradient.try_normalize(1e-300).unwrap_or(-closest.normal);
+                if excess >= 0.0 || gap < CLOSEST * sizes.2 {
+                    let way = if excess >= 0.0 { excess / gradient.norm().max(1e-300) } else { 0.0 };
+                    let way = way.max(CLOSEST * sizes.2 - gap).min(sizes.2);
+                    self.escape = Some(-axis * way);
+                }
+                (opposite, Stiffness { own: matter.stiffness_scale, other }, axis, gap)
+            }
+            Other::Piece { label, nearest } => {
+                let other = swarm.matter_of(*nearest as usize);
+                self.link = u32::MAX;
+                locale.gather(swarm, i, Some(*label), f64::INFINITY);
+                // Towards those of the piece that are near, the nearest above all.
+                let mut axis = Vec3::zeros();
+                for j in swarm.near.of(i).iter().map(|j| *j as usize).filter(|j| swarm.label[*j] == *label) {
+                    let way = swarm.place[j] - center;
+                    let distance = way.norm();
+                    let reach = (sizes.1 + other.profile.radius + swarm.offset[j]).max(1e-300);
+                    if distance < reach && distance > 0.0 {
+                        axis += way * ((1.0 - distance / reach).powi(4) / distance);
+                    }
+                }
+                let straight = direction(&center, &swarm.place[*nearest as usize], [self.particle, *nearest]);
+                let axis = axis.try_normalize(1e-12).unwrap_or(straight.0);
+                let opposite = Opposite::Piece { isovalue: other.profile.isovalue };
+                let stiffness = Stiffness { own: matter.stiffness_scale, other: other.stiffness_scale };
+                (opposite, stiffness, axis, 0.5 * straight.1)
+            }
+        };
+        if matches!(opposite, Opposite::Coat(..)) {
+            locale.gather(swarm, i, None, f64::INFINITY);
+        }
+        self.press = contact::press(locale, center, axis, guess, sizes, stiffness, &opposite);
+        self.carriers.clear();
+        if self.link == u32::MAX {
+            let carriers = &mut self.carriers;
+            locale.others_at(&self.press.point, |j, value| carriers.push((j, value)));
+            let sum: f64 = carriers.iter().map(|(_, value)| value).sum();
+            if sum <= 0.0 {
+                let Other::Piece { nearest, .. } = self.other else { return };
+                *carriers = vec![(nearest, 1.0)];
+            } else {
+                carriers.iter_mut().for_each(|(_, value)| *value /= sum);
+            }
+        }
+        let point = self.press.gap.map_or(center + axis * guess, |_| self.press.point);
+        let push = self.press.push;
+        self.rest(swarm, motions, point, patience);
+        self.press.push = push;
+    }
+
+    /// Notes where it was integrated.
+    fn rest(&mut self, swarm: &Swarm, motions: &[Motion], point: Vec3, patience: f64) {
+        self.press.push = Vec3::zeros();
+        if let Some(motion) = motions.get(self.link as usize) {
+            self.arm = motion.rotation.inverse() * (point - (motion.center - swarm.origin));
+            self.carriers.clear();
+        }
+        self.from_anchor = swarm.place[self.particle as usize] - self.anchor(swarm, motions);
+        self.patience = patience;
+    }
+}

@@ -1,0 +1,587 @@
+//! Substances: what can be asked of particles and said about them, and their part of a step.
+//!
+//! [`substance`](crate::substance) has the physics. A substance is a body whose particles take the place of links; what
+//! its descriptor says of isovalue, stiffness, friction, dissipation, categories and masks holds for its coat.
+
+use super::desc::BodyId;
+use super::gather::material;
+use super::step::Stepping;
+use super::{Body, Contact, LinkId, LogLevel, Scheme, SkeletonId, World, sleep};
+use crate::base::{Kind, Motion};
+use crate::coat::seeds;
+use crate::error::{Error, Result, out_of_range, require, require_finite};
+use crate::field::{Placed, Shape};
+use crate::math::{Vec3, Wrench};
+use crate::substance::pieces::Findings;
+use crate::substance::system::{CROWD, Matter, Obstacle, Swarm, System, with_locale};
+use crate::substance::volume::{Share, measure, next_offset};
+pub use crate::substance::{Change, Particle, ParticleId, SubstanceDesc};
+use crate::substance::{MOST_PARTICLES, Substance, fill};
+use crate::team::Team;
+
+/// Particles that a worker measures at a time.
+const MEASURED: usize = 32;
+
+/// Some of a substance that hangs together.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Piece {
+    /// Its particles.
+    pub particles: Vec<ParticleId>,
+    /// Mass \[kg\].
+    pub mass: f64,
+    /// Volume of its solid at the last step \[m³\].
+    pub volume: f64,
+    /// Centre of mass \[m\].
+    pub center: Vec3,
+    /// Momentum \[N s\].
+    pub momentum: Vec3,
+    /// Angular momentum about the centre of mass \[N m s\].
+    pub angular_momentum: Vec3,
+}
+
+/// A shape to fill with particles.
+#[derive(Clone, Copy, Debug)]
+pub enum Fill<'a> {
+    /// A box with the world's axes, by two corners \[m\].
+    Box {
+        /// Lowest corner.
+        low: Vec3,
+        /// Highest corner.
+        high: Vec3,
+    },
+    /// A ball \[m\].
+    Ball {
+        /// Its centre.
+        center: Vec3,
+        /// Its radius.
+        radius: f64,
+    },
+    /// A closed triangle mesh.
+    Mesh {
+        /// Corners \[m\].
+        vertices: &'a [[f64; 3]],
+        /// Triangles, by their corners.
+        triangles: &'a [[u32; 3]],
+    },
+}
+
+/// Substances.
+impl World {
+    /// Makes a body a substance: its base is particles from now on. Refused for a rigid body and for one with links.
+    pub fn make_substance(&mut self, body: BodyId, desc: SubstanceDesc) -> Result<()> {
+        desc.validate()?;
+        let body = self.bodies.get_mut(body)?;
+        if body.desc.rigid {
+            return Err(Error::Unsupported("a rigid body cannot be a substance"));
+        }
+        if !body.links.is_empty() || body.substance.is_some() {
+            return Err(Error::Unsupported("only a body without links can become a substance, once"));
+        }
+        body.substance = Some(Box::new(Substance::new(desc)));
+        Ok(())
+    }
+
+    /// What a substance is like.
+    pub fn substance_desc(&self, body: BodyId) -> Result<&SubstanceDesc> {
+        Ok(&self.substance(body)?.desc)
+    }
+
+    /// Changes what a substance is like, from the next step on.
+    pub fn set_substance_desc(&mut self, body: BodyId, desc: SubstanceDesc) -> Result<()> {
+        desc.validate()?;
+        self.substance_mut(body)?.desc = desc;
+        Ok(())
+    }
+
+    /// Adds particles at these places \[m\], with these velocities \[m/s\] or at rest. Those of one call blend with each
+    /// other, and with nobody else until they fuse. Gives their names, in the same order.
+    pub fn add_particles(
+        &mut self,
+        body: BodyId,
+        positions: &[[f64; 3]],
+        velocities: Option<&[[f64; 3]]>,
+    ) -> Result<Vec<ParticleId>> {
+        let substance = self.substance(body)?;
+        check_states(positions, velocities, positions.len())?;
+        if substance.particles.len() + positions.len() > MOST_PARTICLES {
+            return Err(Error::Capacity("a substance has at most 1048576 particles"));
+        }
+        let substance = self.substance_mut(body)?;
+        let label = substance.next_label;
+        substance.next_label += 1;
+        // Volumes are those that the coat has with the new ones.
+        substance.particles.iter_mut().for_each(|particle| particle.target = None);
+        let add = |(at, position): (usize, &[f64; 3])| {
+            let velocity = velocities.map_or(Vec3::zeros(), |velocities| Vec3::from(velocities[at]));
+            substance.add(Vec3::from(*position), velocity, label)
+        };
+        Ok(positions.iter().enumerate().map(add).collect())
+    }
+
+    /// Fills a shape with particles as far apart as they are at rest, half a spacing within its surface, and adds them as
+    /// [`World::add_particles`] does.
+    pub fn fill_substance(&mut self, body: BodyId, shape: &Fill) -> Result<Vec<ParticleId>> {
+        let spacing = self.substance(body)?.desc.spacing;
+        let inset = 0.5 * spacing;
+        let (low, high) = match shape {
+            Fill::Box { low, high } => (*low, *high),
+            Fill::Ball { center, radius } => {
+                require("radius of a ball to fill", *radius, "> 0", |x| x > 0.0)?;
+                (center - Vec3::repeat(*radius), center + Vec3::repeat(*radius))
+            }
+            Fill::Mesh { vertices, triangles } => check_mesh(vertices, triangles)?,
+        };
+        require_finite("corner of a shape to fill", &low)?;
+        require_finite("corner of a shape to fill", &high)?;
+        let size = high - low;
+        if size.min() < 0.0 {
+            return Err(out_of_range("size of a box to fill", size.min(), "at least 0"));
+        }
+        let count = size.product() * std::f64::consts::SQRT_2 / spacing.powi(3);
+        if count > 4.0 * MOST_PARTICLES as f64 {
+            return Err(Error::Capacity("a shape to fill would take more than 1048576 particles"));
+        }
+        let (low, high) = match shape {
+            Fill::Mesh { .. } => (low, high),
+            _ => (low + Vec3::repeat(inset), high - Vec3::repeat(inset)),
+        };
+        let points = fill::packed(spacing, &low, &high, |p| match shape {
+            Fill::Box { .. } => true,
+            Fill::Ball { center, radius } => (p - center).norm() <= radius - inset,
+            Fill::Mesh { vertices, triangles } => fill::winds_round(vertices, triangles, p),
+        });
+        let points: Vec<[f64; 3]> = points.into_iter().map(Into::into).collect();
+        self.add_particles(body, &points, None)
+    }
+
+    /// Removes particles.
+    pub fn remove_particles(&mut self, body: BodyId, particles: &[ParticleId]) -> Result<()> {
+        let mut places = self.places(body, particles)?;
+        places.sort_unstable();
+        if places.windows(2).any(|pair| pair[0] == pair[1]) {
+            return Err(Error::Unsupported("a particle cannot be removed twice"));
+        }
+        let substance = self.substance_mut(body)?;
+        // From the end: who fills a gap is not one of those to go.
+        places.into_iter().rev().for_each(|place| substance.remove(place));
+        substance.particles.iter_mut().for_each(|particle| particle.target = None);
+        Ok(())
+    }
+
+    /// The particles of a substance. Their order changes only when some are removed.
+    pub fn particles(&self, body: BodyId) -> Result<&[Particle]> {
+        Ok(&self.substance(body)?.particles)
+    }
+
+    /// One particle.
+    pub fn particle(&self, body: BodyId, particle: ParticleId) -> Result<&Particle> {
+        let place = self.places(body, &[particle])?[0];
+        Ok(&self.substance(body)?.particles[place])
+    }
+
+    /// Puts particles elsewhere, or gives them other velocities; what is not given stays.
+    pub fn set_particles(
+        &mut self,
+        body: BodyId,
+        particles: &[ParticleId],
+        positions: Option<&[[f64; 3]]>,
+        velocities: Option<&[[f64; 3]]>,
+    ) -> Result<()> {
+        let places = self.places(body, particles)?;
+        check_states(positions.unwrap_or_default(), velocities, places.len())?;
+        if positions.is_some_and(|positions| positions.len() != places.len()) {
+            return Err(Error::Unsupported("positions must be as many as particles"));
+        }
+        let substance = self.substance_mut(body)?;
+        for (at, place) in places.into_iter().enumerate() {
+            let particle = &mut substance.particles[place];
+            if let Some(positions) = positions {
+                particle.position = positions[at].into();
+            }
+            if let Some(velocities) = velocities {
+                particle.velocity = velocities[at].into();
+            }
+        }
+        Ok(())
+    }
+
+    /// Pulls at particles in the next step \[N\]; forces add up.
+    pub fn add_particle_forces(&mut self, body: BodyId, particles: &[ParticleId], forces: &[[f64; 3]]) -> Result<()> {
+        let places = self.places(body, particles)?;
+        check_states(forces, None, places.len())?;
+        if forces.len() != places.len() {
+            return Err(Error::Unsupported("forces must be as many as particles"));
+        }
+        let substance = self.substance_mut(body)?;
+        for (place, force) in places.into_iter().zip(forces) {
+            substance.particles[place].force += Vec3::from(*force);
+        }
+        Ok(())
+    }
+
+    /// The pieces of a substance: what hung together in one solid after the last step. In the order of their first
+    /// particles.
+    pub fn pieces(&self, body: BodyId) -> Result<Vec<Piece>> {
+        let substance = self.substance(body)?;
+        let mut pieces: std::collections::BTreeMap<u32, Vec<usize>> = std::collections::BTreeMap::new();
+        for (place, particle) in substance.particles.iter().enumerate() {
+            pieces.entry(particle.piece).or_default().push(place);
+        }
+        let mass = substance.desc.particle_mass;
+        let piece = |places: Vec<usize>| {
+            let members = || places.iter().map(|place| &substance.particles[*place]);
+            let count = places.len() as f64;
+            let center = members().map(|particle| particle.position).sum::<Vec3>() / count;
+            let momentum = members().map(|particle| particle.velocity * mass).sum();
+            let turn = |particle: &Particle| (particle.position - center).cross(&particle.velocity) * mass;
+            Piece {
+                particles: members().map(|particle| particle.id).collect(),
+                mass: mass * count,
+                volume: members().map(|particle| particle.volume).sum(),
+                center,
+                momentum,
+                angular_momentum: members().map(turn).sum(),
+            }
+        };
+        Ok(pieces.into_values().map(piece).collect())
+    }
+
+    /// What came apart and what fused in the last step.
+    pub fn substance_changes(&self, body: BodyId) -> Result<&[Change]> {
+        Ok(&self.substance(body)?.changes)
+    }
+
+    fn substance(&self, body: BodyId) -> Result<&Substance> {
+        self.bodies.get(body)?.substance.as_deref().ok_or(NO_SUBSTANCE)
+    }
+
+    fn substance_mut(&mut self, body: BodyId) -> Result<&mut Substance> {
+        self.bodies.get_mut(body)?.substance.as_deref_mut().ok_or(NO_SUBSTANCE)
+    }
+
+    fn places(&self, body: BodyId, particles: &[ParticleId]) -> Result<Vec<usize>> {
+        let substance = self.substance(body)?;
+        let place = |id: &ParticleId| {
+            let gone = Error::InvalidHandle { noun: "particle", reason: "it was removed, or never was" };
+            substance.place_of(*id).ok_or(gone)
+        };
+        particles.iter().map(place).collect()
+    }
+}
+
+const NO_SUBSTANCE: Error = Error::Unsupported("the body is not a substance");
+
+fn check_states(positions: &[[f64; 3]], velocities: Option<&[[f64; 3]]>, count: usize) -> Result<()> {
+    positions.iter().try_for_each(|p| require_finite("position or force of a particle", &Vec3::from(*p)))?;
+    let velocities = velocities.unwrap_or_default();
+    velocities.iter().try_for_each(|v| require_finite("velocity of a particle", &Vec3::from(*v)))?;
+    if !velocities.is_empty() && velocities.len() != count {
+        return Err(Error::Unsupported("velocities must be as many as particles"));
+    }
+    Ok(())
+}
+
+/// Bounds of a mesh.
+fn check_mesh(vertices: &[[f64; 3]], triangles: &[[u32; 3]]) -> Result<(Vec3, Vec3)> {
+    vertices.iter().try_for_each(|p| require_finite("corner of a mesh to fill", &Vec3::from(*p)))?;
+    let most =
+        triangles.iter().flatten().copied().max().ok_or(Error::Unsupported("a mesh to fill has no triangles"))?;
+    if most as usize >= vertices.len() {
+        return Err(out_of_range("corner of a triangle to fill", most, "below the number of vertices"));
+    }
+    let corners = || triangles.iter().flatten().map(|corner| Vec3::from(vertices[*corner as usize]));
+    let low = corners().fold(Vec3::repeat(f64::INFINITY), |low, p| low.inf(&p));
+    Ok((low, corners().fold(Vec3::repeat(f64::NEG_INFINITY), |high, p| high.sup(&p))))
+}
+
+/// The step's part.
+impl World {
+    /// Substances that take part, by the slots of their bodies.
+    fn substances(&self) -> impl Iterator<Item = (u32, &Body, &Substance)> {
+        self.bodies.indices().filter_map(|slot| {
+            let body = &self.bodies[slot];
+            let substance = body.substance.as_deref().filter(|s| body.enabled && !s.particles.is_empty())?;
+            Some((slot as u32, body, substance))
+        })
+    }
+
+    /// Where the fields of a substance may reach in a step.
+    fn region_of(&self, substance: &Substance, radius: f64, dt: f64) -> (Vec3, Vec3) {
+        let (mut low, mut high) = (Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY));
+        let fall = 0.5 * self.desc.gravity.norm() * dt * dt;
+        for particle in &substance.particles {
+            let margin = Vec3::repeat(1.2 * radius + particle.offset + fall) + particle.velocity.abs() * dt;
+            (low, high) = (low.inf(&(particle.position - margin)), high.sup(&(particle.position + margin)));
+        }
+        (low, high)
+    }
+
+    /// Who sleeps near a substance does not.
+    pub(super) fn wake_near_substances(&mut self, state: &Stepping, dt: f64) {
+        if self.desc.sleep_time <= 0.0 {
+            return;
+        }
+        let radius = |body: &Body, substance: &Substance| {
+            substance.desc.profile(body.desc.isovalue).map_or(0.0, |profile| profile.radius)
+        };
+        let regions: Vec<_> = self
+            .substances()
+            .map(|(_, body, substance)| self.region_of(substance, radius(body, substance), dt))
+            .collect();
+        for bounds in &state.last_bounds {
+            let meets = |(low, high): &(Vec3, Vec3)| {
+                (0..3).all(|axis| bounds.low[axis] <= high[axis] && low[axis] <= bounds.high[axis])
+            };
+            if regions.iter().any(meets) {
+                sleep::rouse(&mut self.bodies, &state.resting, bounds.body);
+            }
+        }
+    }
+
+    /// Moves all substances, and gives what they press on the impulses of it.
+    pub(super) fn step_substances(&mut self, state: &mut Stepping, dt: f64, team: &Team) {
+        state.substance_contacts.clear();
+        state.system.substeps = 0;
+        if self.substances().next().is_none() {
+            return;
+        }
+        let mut system = std::mem::take(&mut state.system);
+        self.gather_swarm(&mut system.swarm);
+        self.gather_obstacles(&mut system, state, dt);
+        let mut motions = state.motions.clone();
+        for obstacle in &system.obstacles {
+            for link in &obstacle.side.links {
+                self.support(*link, &mut motions[*link as usize]);
+            }
+        }
+        system.advance(&mut motions, dt, self.desc.substep_phase, self.desc.max_substeps, team);
+        for (link, wrench) in system.carried.iter().enumerate() {
+            if *wrench != Wrench::default() {
+                state.motions[link].push(wrench);
+            }
+        }
+        for index in 0..self.links.capacity() {
+            if let Some(link) = self.links.at_mut(index) {
+                link.substance_impulse = system.carried[index];
+            }
+        }
+        self.list_contacts(&system, &motions, state);
+        self.settle_substances(&mut system, dt, team);
+        state.system = system;
+    }
+
+    /// What holds a link that the library moves against what the substances do to it: the other contacts of the last
+    /// step. The implicit response knows only afterwards.
+    fn support(&self, link: u32, motion: &mut Motion) {
+        let Some(link) = self.links.is_live(link as usize).then(|| &self.links[link as usize]) else { return };
+        if matches!(link.desc.kind, Kind::Rigid | Kind::PointMass) && link.last_dt > 0.0 {
+            let mut other = link.contact_impulse;
+            other.add_scaled(&link.substance_impulse, -1.0);
+            let held = motion.answer(&other);
+            motion.acceleration += held.linear / link.last_dt;
+            motion.angular_acceleration += held.angular / link.last_dt;
+        }
+    }
+
+    fn gather_swarm(&self, swarm: &mut Swarm) {
+        let columns = std::mem::take(swarm);
+        *swarm = Swarm { near: columns.near, ..Swarm::default() };
+        let mut bonds = Vec::new();
+        let mut first_label = 0;
+        for (slot, body, substance) in self.substances() {
+            if swarm.matters.is_empty() {
+                swarm.origin = substance.particles[0].position;
+            }
+            // Its descriptor was checked when it came.
+            let Ok(profile) = substance.desc.profile(body.desc.isovalue) else { continue };
+            let (kind, first) = (swarm.matters.len() as u16, swarm.place.len() as u32);
+            let desc = &substance.desc;
+            let mut rays = Vec::new();
+            seeds::rays(&Shape::Point(Vec3::zeros()), profile.thickness, desc.seed_count as usize, &mut rays);
+            swarm.matters.push(Matter {
+                body: slot,
+                spacing: desc.spacing,
+                mass: desc.particle_mass,
+                cohesion: desc.cohesion,
+                viscosity: desc.viscosity,
+                damping: desc.damping,
+                fusion_threshold: desc.fusion_threshold,
+                farthest: profile.distance_of_level(profile.isovalue / CROWD),
+                profile,
+                stiffness_scale: body.stiffness_scale,
+                material: material(body, body),
+                directions: rays.iter().map(|ray| ray.direction).collect(),
+            });
+            for particle in &substance.particles {
+                swarm.place.push(particle.position - swarm.origin);
+                swarm.velocity.push(particle.velocity);
+                swarm.pull.push(self.desc.gravity + particle.force / desc.particle_mass);
+                swarm.offset.push(particle.offset);
+                swarm.label.push(first_label + particle.label);
+                swarm.kind.push(kind);
+            }
+            bonds.extend(substance.bonds.iter().map(|bond| (bond.pair.map(|end| end + first), bond.weight)));
+            first_label += substance.next_label;
+        }
+        swarm.set_bonds(&bonds);
+    }
+
+    fn gather_obstacles(&mut self, system: &mut System, state: &mut Stepping, dt: f64) {
+        let mut filter = self.pair_filter.get_mut().take();
+        let mut old = std::mem::take(&mut system.obstacles).into_iter();
+        for bounds in &state.last_bounds {
+            let (slot, body) = (bounds.body, &self.bodies[bounds.body as usize]);
+            let mut region: Option<(Vec3, Vec3)> = None;
+            let mut materials = vec![None; system.swarm.matters.len()];
+            for (matter, found) in system.swarm.matters.iter().zip(&mut materials) {
+                let own = &self.bodies[matter.body as usize];
+                let Some(substance) = &own.substance else { continue };
+                let (low, high) = self.region_of(substance, matter.profile.radius, dt);
+                let (low, high) = (low.sup(&bounds.low), high.inf(&bounds.high));
+                let meets = (0..3).all(|axis| low[axis] <= high[axis]);
+                let agree = own.desc.mask & body.desc.category != 0 && body.desc.mask & own.desc.category != 0;
+                let mut allowed = || {
+                    let pair = [matter.body.min(slot), matter.body.max(slot)];
+                    let [a, b] = pair.map(|body| self.bodies.id_of(body as usize));
+                    filter.as_mut().is_none_or(|filter| filter(a, b))
+                };
+                if meets && agree && allowed() {
+                    *found = Some(material(own, body));
+                    region = Some(region.map_or((low, high), |(l, h)| (l.inf(&low), h.sup(&high))));
+                }
+            }
+            let Some(region) = region else { continue };
+            let mut obstacle = old.next().unwrap_or_default();
+            self.fill_side(&mut obstacle.side, body, &state.motions, &region, dt);
+            if !obstacle.side.skeletons.is_empty() {
+                obstacle.materials = materials;
+                system.obstacles.push(obstacle);
+            }
+        }
+        *self.pair_filter.get_mut() = filter;
+    }
+
+    /// A contact for each substance and each link that it presses on.
+    fn list_contacts(&self, system: &System, motions: &[Motion], state: &mut Stepping) {
+        let contacts: &mut Vec<Contact> = &mut state.substance_contacts;
+        let origin = system.swarm.origin;
+        let mut sums: std::collections::BTreeMap<(u32, u32), usize> = std::collections::BTreeMap::new();
+        system.contacts(motions, |own, _: &Obstacle, link, press| {
+            let place = *sums.entry((own, link)).or_insert_with(|| {
+                let other = self.links[link as usize].body;
+                contacts.push(Contact {
+                    bodies: [own, other].map(|body| self.bodies.id_of(body as usize)),
+                    links: [LinkId::default(), self.links.id_of(link as usize)],
+                    skeletons: [SkeletonId::default(); 2],
+                    scheme: Scheme::Seeds,
+                    ..Contact::default()
+                });
+                contacts.len() - 1
+            });
+            let contact = &mut contacts[place];
+            let size = press.push.norm();
+            contact.force -= press.push;
+            // First sums, weighted by the size of the force.
+            contact.position += press.point * size;
+            contact.torque -= press.point.cross(&press.push);
+            contact.area += press.area;
+            contact.stiffness += press.stiffness;
+            contact.peak_pressure = contact.peak_pressure.max(press.peak.0);
+            contact.normal.x += size;
+        });
+        for contact in contacts {
+            let total = contact.normal.x;
+            contact.position /= total;
+            contact.torque -= contact.position.cross(&contact.force);
+            contact.position += origin;
+            contact.normal = contact.force.try_normalize(0.0).unwrap_or_else(Vec3::zeros);
+        }
+    }
+
+    /// Volumes, offsets, pieces, bonds; and all back to the bodies.
+    fn settle_substances(&mut self, system: &mut System, dt: f64, team: &Team) {
+        let swarm = &system.swarm;
+        let mut shares = vec![Share::default(); swarm.place.len()];
+        team.each_mut(&mut shares, MEASURED, |index, share| {
+            with_locale(|locale| measure(swarm, index, &swarm.matter_of(index).directions, locale, share));
+        });
+        let mut first = 0;
+        for (kind, matter) in swarm.matters.iter().enumerate() {
+            let Some(substance) = self.bodies[matter.body as usize].substance.as_deref_mut() else { continue };
+            let count = substance.particles.len();
+            let own = first..first + count;
+            for (particle, index) in substance.particles.iter_mut().zip(own.clone()) {
+                particle.position = swarm.place[index] + swarm.origin;
+                particle.velocity = swarm.velocity[index];
+                particle.force = Vec3::zeros();
+                particle.volume = shares[index].volume;
+                particle.target.get_or_insert(shares[index].volume);
+            }
+            let is_own = |index: &u32| own.contains(&(*index as usize));
+            let local = |index: u32| index - first as u32;
+            let mut findings = Findings::default();
+            for index in own.clone() {
+                let joined = shares[index].joined.iter().filter(|other| is_own(other));
+                findings.joined.extend(joined.map(|other| [local(index as u32), local(*other)]));
+            }
+            let pressed = system.pressed.iter().filter(|pair| pair.iter().all(|end| is_own(end)));
+            findings.pressed.extend(pressed.map(|pair| pair.map(local)));
+            let reaching = |place: u32| -> Vec<u32> {
+                let index = first + place as usize;
+                let reach = |other: usize| 2.0 * matter.profile.radius + swarm.offset[index] + swarm.offset[other];
+                let near = swarm.near.of(index).iter().copied().filter(|other| {
+                    let at = *other as usize;
+                    swarm.kind[at] as usize == kind
+                        && (swarm.place[at] - swarm.place[index]).norm_squared() < reach(at).powi(2)
+                });
+                near.map(local).collect()
+            };
+            substance.settle(&findings, dt, reaching);
+            substance.control_volume(&shares[own], matter.profile.thickness);
+            first += count;
+        }
+        if system.overloaded
+            && !std::mem::replace(&mut system.told, true)
+            && let Some(log) = self.log.get_mut()
+        {
+            log(LogLevel::Warning, "a substance is stiffer than max_substeps can follow, or was pushed out of a body");
+        }
+    }
+
+    /// A substance as a coat: its particles as skeletons, in a frame at `origin`.
+    pub(super) fn fill_particles(&self, body: &Body, substance: &Substance, coat: &mut crate::coat::Coat) {
+        let Ok(profile) = substance.desc.profile(body.desc.isovalue) else { return };
+        let origin = coat.origin;
+        coat.skeletons.extend(substance.particles.iter().map(|particle| Placed {
+            shape: Shape::Point(particle.position - origin),
+            profile: profile.inflated(particle.offset),
+        }));
+        let labels = substance.particles.iter().map(|particle| particle.label);
+        let bonds = substance.bonds.iter().map(|bond| (bond.pair, bond.weight));
+        coat.graph.set_pieces(labels, bonds);
+    }
+}
+
+impl Substance {
+    /// Moves the offsets so that each piece keeps its volume: what buried particles lack, those on the surface make good.
+    fn control_volume(&mut self, shares: &[Share], thickness: f64) {
+        let gain = self.desc.volume_gain;
+        if gain == 0.0 {
+            return;
+        }
+        let mut sums: std::collections::BTreeMap<u32, (f64, f64)> = std::collections::BTreeMap::new();
+        for (particle, share) in self.particles.iter().zip(shares) {
+            let (lack, surface) = sums.entry(particle.label).or_default();
+            *surface += share.exposed;
+            if share.exposed <= 0.0 {
+                *lack += particle.target.map_or(0.0, |target| target - share.volume);
+            }
+        }
+        for (particle, share) in self.particles.iter_mut().zip(shares) {
+            let (lack, surface) = sums[&particle.label];
+            let missing = if surface > 0.0 { lack / surface } else { 0.0 };
+            let target = particle.target.unwrap_or(share.volume);
+            particle.offset = next_offset(particle.offset, gain, share, target, missing, thickness);
+        }
+    }
+}
