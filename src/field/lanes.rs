@@ -616,40 +616,53 @@ fn inverse_or_zero(x: f64) -> f64 {
 }
 
 /// One number for each of `W` points.
-#[derive(Clone, Copy)]
-struct Lanes<const W: usize>([f64; W]);
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Lanes<const W: usize>(pub [f64; W]);
 
 impl<const W: usize> Lanes<W> {
     #[inline(always)]
-    fn splat(x: f64) -> Self {
+    pub fn splat(x: f64) -> Self {
         Self([x; W])
     }
 
     #[inline(always)]
-    fn zip(self, other: Self, operation: impl Fn(f64, f64) -> f64) -> Self {
+    pub fn zip(self, other: Self, operation: impl Fn(f64, f64) -> f64) -> Self {
         Self(std::array::from_fn(|i| operation(self.0[i], other.0[i])))
     }
 
     /// `yes` where `self > other`, else `no` (also where either is not a number).
     #[inline(always)]
-    fn where_greater(self, other: Self, yes: Self, no: Self) -> Self {
+    pub fn where_greater(self, other: Self, yes: Self, no: Self) -> Self {
         Self(std::array::from_fn(|i| if self.0[i] > other.0[i] { yes.0[i] } else { no.0[i] }))
     }
 
     #[inline(always)]
-    fn where_less(self, other: Self, yes: Self, no: Self) -> Self {
+    pub fn where_less(self, other: Self, yes: Self, no: Self) -> Self {
         other.where_greater(self, yes, no)
     }
 
     // Unlike those of `f64`, these are one instruction each; where `self` is not a number, it stays so.
     #[inline(always)]
-    fn max(self, other: Self) -> Self {
+    pub fn max(self, other: Self) -> Self {
         self.zip(other, |x, y| if y > x { y } else { x })
     }
 
     #[inline(always)]
-    fn min(self, other: Self) -> Self {
+    pub fn min(self, other: Self) -> Self {
         self.zip(other, |x, y| if y < x { y } else { x })
+    }
+
+    /// In pairs, so that the sum is the same bits in any registers.
+    #[inline(always)]
+    pub fn sum(self) -> f64 {
+        let (mut sums, mut width) = (self.0, W);
+        while width > 1 {
+            width /= 2;
+            for lane in 0..width {
+                sums[lane] += sums[lane + width];
+            }
+        }
+        sums[0]
     }
 
     #[inline(always)]
@@ -658,7 +671,7 @@ impl<const W: usize> Lanes<W> {
     }
 
     #[inline(always)]
-    fn sqrt(self) -> Self {
+    pub fn sqrt(self) -> Self {
         Self(self.0.map(f64::sqrt))
     }
 

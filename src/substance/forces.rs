@@ -66,6 +66,17 @@ impl Law {
         }
     }
 
+    /// Both at once.
+    pub fn force_stiffness(&self, r: f64) -> (f64, f64) {
+        if r < self.hard {
+            return (self.hard_force + self.hard_stiffness * (self.hard - r), self.hard_stiffness);
+        }
+        let (force, stiffness) = bare(self.spacing, self.cohesion, r);
+        // The most up to there.
+        let rest = 4.0 * self.cohesion / (self.spacing * self.spacing);
+        (force - self.shift, if r < self.spacing { stiffness } else { rest })
+    }
+
     /// Stiffness at a distance \[N/m\]: the most up to there.
     pub fn stiffness(&self, r: f64) -> f64 {
         if r < self.hard { self.hard_stiffness } else { bare(self.spacing, self.cohesion, r.min(self.spacing)).1 }

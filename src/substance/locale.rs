@@ -9,7 +9,10 @@
 //! where `f_A = f_B` both ways of looking give the same. The same fraction, `Σ b_ij f_i f_j / (f_A f_B)`, is how far A and
 //! B have become one at a point; the rest of them collides ([`field::graph`](crate::field::graph) has it for queries).
 
+use std::sync::atomic::{Ordering, compiler_fence};
+
 use super::system::{Matter, Swarm};
+use crate::field::lanes::Lanes;
 use crate::math::Vec3;
 
 /// Fields are summed eight at a time, in eight sums: the same bits whatever registers there are.
@@ -18,25 +21,27 @@ const WIDTH: usize = 8;
 /// Eight particles, as columns.
 #[derive(Clone, Copy, Debug)]
 struct Block {
-    place: [[f64; WIDTH]; 3],
-    thickness: [f64; WIDTH],
+    place: [Lanes<WIDTH>; 3],
+    thickness: Lanes<WIDTH>,
     /// One over the width of the outer part, and the two coefficients of its cubic.
-    inverse_width: [f64; WIDTH],
-    cubic: [f64; WIDTH],
-    square: [f64; WIDTH],
-    isovalue: [f64; WIDTH],
-    stiffness: [f64; WIDTH],
+    inverse_width: Lanes<WIDTH>,
+    cubic: Lanes<WIDTH>,
+    square: Lanes<WIDTH>,
+    isovalue: Lanes<WIDTH>,
+    stiffness: Lanes<WIDTH>,
 }
+
+const ZERO: Lanes<WIDTH> = Lanes([0.0; WIDTH]);
 
 /// Eight that have no field.
 const NOBODY: Block = Block {
-    place: [[1e30; WIDTH], [0.0; WIDTH], [0.0; WIDTH]],
-    thickness: [0.0; WIDTH],
-    inverse_width: [1.0; WIDTH],
-    cubic: [0.0; WIDTH],
-    square: [0.0; WIDTH],
-    isovalue: [0.0; WIDTH],
-    stiffness: [0.0; WIDTH],
+    place: [Lanes([1e30; WIDTH]), ZERO, ZERO],
+    thickness: ZERO,
+    inverse_width: Lanes([1.0; WIDTH]),
+    cubic: ZERO,
+    square: ZERO,
+    isovalue: ZERO,
+    stiffness: ZERO,
 };
 
 /// Particles whose fields add up.
@@ -65,20 +70,20 @@ impl Group {
         let width = profile.radius - profile.thickness;
         let kw = profile.stiffness * width;
         for (axis, column) in block.place.iter_mut().enumerate() {
-            column[lane] = place[axis];
+            column.0[lane] = place[axis];
         }
-        block.thickness[lane] = profile.thickness + offset;
-        block.inverse_width[lane] = 1.0 / width;
-        block.cubic[lane] = kw - 2.0 * profile.isovalue;
-        block.square[lane] = 3.0 * profile.isovalue - kw;
-        block.isovalue[lane] = profile.isovalue;
-        block.stiffness[lane] = profile.stiffness;
+        block.thickness.0[lane] = profile.thickness + offset;
+        block.inverse_width.0[lane] = 1.0 / width;
+        block.cubic.0[lane] = kw - 2.0 * profile.isovalue;
+        block.square.0[lane] = 3.0 * profile.isovalue - kw;
+        block.isovalue.0[lane] = profile.isovalue;
+        block.stiffness.0[lane] = profile.stiffness;
         self.indices.push(index);
     }
 
     /// The field of one.
     fn one(&self, k: usize, p: &Vec3) -> f64 {
-        self.blocks[k / WIDTH].fields::<false>(p)[0][k % WIDTH]
+        self.blocks[k / WIDTH].fields::<false>(p)[0].0[k % WIDTH]
     }
 
     fn value(&self, p: &Vec3) -> f64 {
@@ -92,7 +97,7 @@ impl Group {
 
     fn values(&self, p: &Vec3, out: &mut Vec<f64>) {
         out.clear();
-        out.extend(self.blocks.iter().flat_map(|block| block.fields::<false>(p)[0]));
+        out.extend(self.blocks.iter().flat_map(|block| block.fields::<false>(p)[0].0));
     }
 
     /// Sums of the columns of [`Block::fields`], with the widest registers of this processor.
@@ -126,48 +131,43 @@ fn run_avx512<const GRADIENT: bool>(blocks: &[Block], p: &Vec3) -> [f64; 4] {
 
 #[inline(always)]
 fn sums<const GRADIENT: bool>(blocks: &[Block], p: &Vec3) -> [f64; 4] {
-    let mut sums = [[0.0; WIDTH]; 4];
+    // Written out: what is not inlined here would not use the wide registers.
+    let (mut value, mut x, mut y, mut z) = (ZERO, ZERO, ZERO, ZERO);
     for block in blocks {
-        let fields = block.fields::<GRADIENT>(p);
-        for (sum, field) in sums.iter_mut().zip(&fields).take(if GRADIENT { 4 } else { 1 }) {
-            for lane in 0..WIDTH {
-                sum[lane] += field[lane];
-            }
+        // No cost at run time: keeps the compiler from spreading vectors over several blocks, as in `field::lanes`.
+        compiler_fence(Ordering::SeqCst);
+        let [field, gx, gy, gz] = block.fields::<GRADIENT>(p);
+        value = value + field;
+        if GRADIENT {
+            (x, y, z) = (x + gx, y + gy, z + gz);
         }
     }
-    sums.map(|sum| ((sum[0] + sum[1]) + (sum[2] + sum[3])) + ((sum[4] + sum[5]) + (sum[6] + sum[7])))
+    [value.sum(), x.sum(), y.sum(), z.sum()]
 }
 
 impl Block {
     /// Each one's field, and its gradient if asked for.
     #[inline(always)]
-    #[allow(clippy::needless_range_loop)] // One loop over all columns is what becomes vector instructions.
-    fn fields<const GRADIENT: bool>(&self, p: &Vec3) -> [[f64; WIDTH]; 4] {
-        let mut out = [[0.0; WIDTH]; 4];
-        for lane in 0..WIDTH {
-            let (x, y, z) = (p.x - self.place[0][lane], p.y - self.place[1][lane], p.z - self.place[2][lane]);
-            let distance = (x * x + y * y + z * z).sqrt();
-            let depth = self.thickness[lane] - distance;
-            let w = self.inverse_width[lane];
-            // Outside, a cubic in u, which runs from 1 on the surface to 0 where the field ends; inside, a line.
-            let u = 1.0 + depth * w;
-            let u = if u > 0.0 { u } else { 0.0 };
-            let outer = u * u * (self.square[lane] + self.cubic[lane] * u);
-            let inner = self.isovalue[lane] + self.stiffness[lane] * depth;
-            let inside = depth > 0.0;
-            out[0][lane] = if inside { inner } else { outer };
-            if GRADIENT {
-                let outer_slope = -u * (2.0 * self.square[lane] + 3.0 * self.cubic[lane] * u) * w;
-                let slope = if inside { -self.stiffness[lane] } else { outer_slope };
-                // At the particle itself the direction is lost, and with it nothing that counts.
-                let far = if distance > 1e-150 { distance } else { 1e-150 };
-                let over = slope / far;
-                out[1][lane] = over * x;
-                out[2][lane] = over * y;
-                out[3][lane] = over * z;
-            }
+    fn fields<const GRADIENT: bool>(&self, p: &Vec3) -> [Lanes<WIDTH>; 4] {
+        let (zero, one) = (Lanes::splat(0.0), Lanes::splat(1.0));
+        let (x, y) = (Lanes::splat(p.x) - self.place[0], Lanes::splat(p.y) - self.place[1]);
+        let z = Lanes::splat(p.z) - self.place[2];
+        let distance = (x * x + y * y + z * z).sqrt();
+        let depth = self.thickness - distance;
+        // Outside, a cubic in u, which runs from 1 on the surface to 0 where the field ends; inside, a line.
+        let u = (one + depth * self.inverse_width).max(zero);
+        let outer = u * u * (self.square + self.cubic * u);
+        let inner = self.isovalue + self.stiffness * depth;
+        let value = depth.where_greater(zero, inner, outer);
+        if !GRADIENT {
+            return [value, zero, zero, zero];
         }
-        out
+        let two = Lanes::splat(2.0);
+        let outer_slope = u * (two * self.square + Lanes::splat(3.0) * self.cubic * u) * self.inverse_width;
+        let slope = depth.where_greater(zero, self.stiffness, outer_slope);
+        // At the particle itself the direction is lost, and with it nothing that counts.
+        let over = zero - slope / distance.max(Lanes::splat(1e-150));
+        [value, over * x, over * y, over * z]
     }
 }
 

@@ -131,12 +131,14 @@ impl Swarm {
         self.bond_lists.extend(sided.into_iter().map(|(_, b, w)| (b, w)));
     }
 
-    /// Finds who is near whom, as far as any two fields reach each other, and a little farther.
+    /// Finds who is near whom: all whose fields reach where the surface near a particle can be, and a little farther.
     pub fn find_neighbours(&mut self) {
         let offset = self.offset.iter().copied().fold(0.0, f64::max);
         let radius = self.matters.iter().map(|matter| matter.profile.radius).fold(0.0, f64::max);
         self.widest = radius + offset;
-        self.near.find(&self.place, 2.0 * self.widest + SKIN * radius);
+        let farthest = self.matters.iter().map(|matter| matter.farthest).fold(0.0, f64::max);
+        let reach = self.widest + offset + farthest;
+        self.near.find(&self.place, reach + SKIN * radius);
     }
 }
 
@@ -199,6 +201,9 @@ pub struct System {
     force: Vec<Vec3>,
     laws: Vec<Law>,
     softened: f64,
+    /// Stiffness of the stiffest pair over its mass, and square of the speed of the fastest over the thickness.
+    pair_rate2: f64,
+    pair_speed2: f64,
     /// The warning was given.
     pub told: bool,
     /// The forces are those of the present places.
@@ -252,12 +257,13 @@ impl System {
         self.build(motions);
         self.refresh(motions, team);
         let mut left = dt;
+        self.softened = (2.0 * phase / least).powi(2);
         while left > 0.0 {
+            if !self.forced {
+                self.forces(motions);
+            }
             let wanted = self.stride(motions, phase).max(least);
             let h = left / (left / wanted * (1.0 - 1e-12)).ceil().max(1.0);
-            let softened = (2.0 * phase / least).powi(2);
-            self.forced &= softened == self.softened;
-            self.softened = softened;
             self.substep(motions, h, team);
             self.substeps += 1;
             left = if left - h > 1e-9 * dt { left - h } else { 0.0 };
@@ -367,19 +373,7 @@ impl System {
     /// The longest sub-step that follows what is there.
     fn stride(&self, motions: &[Motion], phase: f64) -> f64 {
         let swarm = &self.swarm;
-        let mut rate2: f64 = 0.0;
-        let mut speed: f64 = 0.0;
-        for (i, j, weight) in &self.pairs {
-            let (i, j) = (*i as usize, *j as usize);
-            let (matter, law) = (swarm.matter_of(i), &self.laws[swarm.kind[i] as usize]);
-            let offset = swarm.place[j] - swarm.place[i];
-            let distance = offset.norm();
-            let approach = (swarm.velocity[i] - swarm.velocity[j]).norm();
-            if distance < CUT * matter.spacing {
-                rate2 = rate2.max(weight * law.stiffness(distance) / matter.mass);
-            }
-            speed = speed.max(approach / matter.profile.thickness);
-        }
+        let (rate2, mut speed) = (self.pair_rate2, self.pair_speed2.sqrt());
         // 2 phase / rate of a pair is phase r_0 sqrt(m / γ) at rest.
         let mut contact2: f64 = 0.0;
         let mut sum: (u32, f64) = (u32::MAX, 0.0);
@@ -402,9 +396,6 @@ impl System {
     }
 
     fn substep(&mut self, motions: &mut [Motion], h: f64, team: &Team) {
-        if !self.forced {
-            self.forces(motions);
-        }
         self.kick(motions, 0.5 * h);
         for i in 0..self.swarm.place.len() {
             let velocity = self.swarm.velocity[i];
@@ -429,21 +420,26 @@ impl System {
         links
     }
 
-    /// Forces between particles, and of loads.
+    /// Forces between particles, and of loads; how stiff and how fast pairs are.
     fn forces(&mut self, motions: &[Motion]) {
-        let Self { swarm, force, laws, pairs, loads, .. } = self;
+        let Self { swarm, force, laws, pairs, loads, pair_rate2, pair_speed2, .. } = self;
+        (*pair_rate2, *pair_speed2) = (0.0, 0.0);
         force.clear();
         force.extend(swarm.pull.iter().enumerate().map(|(i, pull)| pull * swarm.matter_of(i).mass));
         for (i, j, weight) in &*pairs {
             let (a, b) = (*i as usize, *j as usize);
             let offset = swarm.place[b] - swarm.place[a];
-            let law = &laws[swarm.kind[a] as usize];
-            let cut = CUT * swarm.matters[swarm.kind[a] as usize].spacing;
+            let (law, matter) = (&laws[swarm.kind[a] as usize], &swarm.matters[swarm.kind[a] as usize]);
+            let cut = CUT * matter.spacing;
             if offset.norm_squared() < cut * cut {
                 let (n, distance) = direction(&swarm.place[a], &swarm.place[b], [*i, *j]);
-                let push = n * (weight * law.force(distance));
+                let (size, stiffness) = law.force_stiffness(distance);
+                let push = n * (weight * size);
                 force[a] -= push;
                 force[b] += push;
+                *pair_rate2 = pair_rate2.max(weight * stiffness / matter.mass);
+                let approach = (swarm.velocity[a] - swarm.velocity[b]).norm_squared();
+                *pair_speed2 = pair_speed2.max(approach / (matter.profile.thickness * matter.profile.thickness));
             }
         }
         for load in &*loads {

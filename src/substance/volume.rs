@@ -6,10 +6,12 @@
 //! shows that the two hang together.
 
 use std::f64::consts::PI;
+use std::sync::atomic::{Ordering, compiler_fence};
 
 use super::locale::Locale;
 use super::system::Swarm;
 use crate::coat::volume::OFFSETS;
+use crate::field::lanes::Lanes;
 use crate::math::Vec3;
 
 /// Longest way of an offset in one step, as a fraction of the thickness.
@@ -30,17 +32,70 @@ pub struct Share {
     pub joined: Vec<u32>,
 }
 
-/// How a ray meets its neighbours.
-struct Rival {
-    index: u32,
-    offset: Vec3,
-    /// `(|q|² - e²) / 2` and `e`: the border is at `first / (u·q + e)`, `e` how much farther out its offset is.
-    first: f64,
-    excess: f64,
-    /// Shortest ray that can end at it.
-    shortest: f64,
-    /// How far it blends.
-    weight: f64,
+/// Rivals are looked at eight at a time.
+const WIDTH: usize = 8;
+
+/// Those whose territories border on that of a particle: the border with one at `q` is at `first / (u·q + excess)` on a ray,
+/// `first = (|q|² - excess²) / 2`, `excess` how much farther out its offset is. Eight of them, as columns.
+#[derive(Clone, Copy)]
+struct Rivals {
+    q: [Lanes<WIDTH>; 3],
+    first: Lanes<WIDTH>,
+    excess: Lanes<WIDTH>,
+}
+
+/// Eight whose borders no ray meets.
+const NOBODY: Rivals = Rivals { q: [Lanes([0.0; WIDTH]); 3], first: Lanes([1.0; WIDTH]), excess: Lanes([0.0; WIDTH]) };
+
+/// The nearest border that a ray meets before `end`, and whose it is.
+#[inline(always)]
+fn nearest(rivals: &[Rivals], u: &Vec3, end: f64) -> (f64, Option<usize>) {
+    let (x, y, z) = (Lanes::splat(u.x), Lanes::splat(u.y), Lanes::splat(u.z));
+    let (none, mut block) = (Lanes::splat(f64::INFINITY), Lanes::splat(0.0));
+    let (mut ends, mut blocks) = (Lanes::splat(end), Lanes::splat(-1.0));
+    for rivals in rivals {
+        compiler_fence(Ordering::SeqCst);
+        let slope = x * rivals.q[0] + y * rivals.q[1] + z * rivals.q[2] + rivals.excess;
+        let border = slope.where_greater(Lanes::splat(0.0), rivals.first / slope, none);
+        blocks = border.where_less(ends, block, blocks);
+        ends = border.where_less(ends, border, ends);
+        block = block + Lanes::splat(1.0);
+    }
+    let mut best = (end, None);
+    for lane in 0..WIDTH {
+        if blocks.0[lane] >= 0.0 && ends.0[lane] < best.0 {
+            best = (ends.0[lane], Some(blocks.0[lane] as usize * WIDTH + lane));
+        }
+    }
+    (best.0.max(0.0), best.1)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn nearest_avx2(rivals: &[Rivals], u: &Vec3, end: f64) -> (f64, Option<usize>) {
+    nearest(rivals, u, end)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f")]
+fn nearest_avx512(rivals: &[Rivals], u: &Vec3, end: f64) -> (f64, Option<usize>) {
+    nearest(rivals, u, end)
+}
+
+/// [`nearest`] with the widest registers of this processor; the same bits with any.
+fn nearest_border(rivals: &[Rivals], u: &Vec3, end: f64) -> (f64, Option<usize>) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        if is_x86_feature_detected!("avx512f") {
+            // SAFETY: the processor has it.
+            return unsafe { nearest_avx512(rivals, u, end) };
+        }
+        if is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has it.
+            return unsafe { nearest_avx2(rivals, u, end) };
+        }
+    }
+    nearest(rivals, u, end)
 }
 
 /// Measures particle `index` by rays of these directions, each of the same solid angle.
@@ -54,41 +109,41 @@ pub fn measure(swarm: &Swarm, index: usize, directions: &[Vec3], locale: &mut Lo
     let isovalue = matter.profile.isovalue;
     let farthest = matter.farthest + own_offset;
     locale.gather(swarm, index, None, farthest + swarm.widest);
-    let mut rivals = Vec::with_capacity(64);
+    // Whose borders they are, and how far they blend.
+    let mut owners: Vec<(u32, f64)> = Vec::with_capacity(64);
+    let mut rivals: Vec<Rivals> = Vec::with_capacity(8);
     for j in swarm.near.of(index) {
         let j_at = *j as usize;
         let weight = if swarm.label[j_at] == label { 1.0 } else { swarm.bond(index, j_at) };
-        let offset = swarm.place[j_at] - center;
+        let q = swarm.place[j_at] - center;
         let excess = swarm.offset[j_at] - own_offset;
-        let square = offset.norm_squared();
+        let square = q.norm_squared();
         // Beyond, the border is farther away than the surface.
-        if weight > 0.0 && square < (2.0 * farthest + excess).powi(2) {
-            let shortest = 0.5 * (square.sqrt() - excess);
-            rivals.push(Rival { index: *j, offset, first: 0.5 * (square - excess * excess), excess, shortest, weight });
+        if weight <= 0.0 || square >= (2.0 * farthest + excess).powi(2) {
+            continue;
         }
-    }
-    rivals.sort_unstable_by(|a, b| a.shortest.total_cmp(&b.shortest).then(a.index.cmp(&b.index)));
-    // The neck of two may be thinner than what rays see.
-    for other in &rivals {
-        let reach = (other.first / (2.0 * other.shortest + 2.0 * other.excess)).max(0.0);
-        if other.first <= 0.0 || 2.0 * matter.profile.value_slope(reach - own_offset).0 >= isovalue {
-            share.join(other.index);
+        let (lane, first) = (owners.len() % WIDTH, 0.5 * (square - excess * excess));
+        if lane == 0 {
+            rivals.push(NOBODY);
+        }
+        if let Some(block) = rivals.last_mut() {
+            for axis in 0..3 {
+                block.q[axis].0[lane] = q[axis];
+            }
+            (block.first.0[lane], block.excess.0[lane]) = (first, excess);
+        }
+        owners.push((*j, weight));
+        // The neck of two may be thinner than what rays see.
+        let reach = first / (square.sqrt() + excess);
+        if first <= 0.0 || 2.0 * matter.profile.value_slope(reach - own_offset).0 >= isovalue {
+            share.join(*j);
         }
     }
     let solid_angle = 4.0 * PI / directions.len() as f64;
     for u in directions {
-        let (mut near, mut rival) = (farthest, None);
-        for other in &rivals {
-            if other.shortest >= near {
-                break;
-            }
-            let slope = u.dot(&other.offset) + other.excess;
-            // Those whose border lies farther out lose, without a division.
-            if slope > 0.0 && other.first < near * slope {
-                (near, rival) = ((other.first / slope).max(0.0), Some(other));
-            }
-        }
-        let Some(rival) = rival else {
+        let (near, rival) = nearest_border(&rivals, u, farthest);
+        let rival = rival.map(|place| owners[place]);
+        let Some((other, weight)) = rival else {
             let distance = surface(locale, &center, u, farthest, thickness, isovalue);
             share.add(solid_angle, distance, 1.0);
             continue;
@@ -97,16 +152,16 @@ pub fn measure(swarm: &Swarm, index: usize, directions: &[Vec3], locale: &mut Lo
         let two = 2.0 * matter.profile.value_slope(near - own_offset).0;
         let is_solid = near <= thickness || two >= isovalue || locale.value(&(center + u * near)) >= isovalue;
         if is_solid {
-            share.join(rival.index);
+            share.join(other);
         }
-        if rival.weight >= 1.0 {
+        if weight >= 1.0 {
             let distance = if is_solid { near } else { surface(locale, &center, u, near, thickness, isovalue) };
             share.add(solid_angle, distance, f64::from(u8::from(!is_solid)));
         } else {
             // Half way of becoming one: between where the ray would end alone, and where it ends with the other.
             let alone = surface(locale, &center, u, farthest, thickness, isovalue);
-            let distance = alone + (near.min(alone) - alone) * rival.weight;
-            share.add(solid_angle, distance, 1.0 - rival.weight);
+            let distance = alone + (near.min(alone) - alone) * weight;
+            share.add(solid_angle, distance, 1.0 - weight);
         }
     }
 }

@@ -3,6 +3,8 @@
 //! [`substance`](crate::substance) has the physics. A substance is a body whose particles take the place of links; what
 //! its descriptor says of isovalue, stiffness, friction, dissipation, categories and masks holds for its coat.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use super::desc::BodyId;
 use super::gather::material;
 use super::step::Stepping;
@@ -20,10 +22,13 @@ use crate::substance::{MOST_PARTICLES, Substance, fill};
 use crate::team::Team;
 
 /// Looks at the volumes in one step, when a piece is farther off than this: squeezed within a step, it swells in the same.
-const LOOKS: usize = 3;
-const TOO_FAR: f64 = 0.01;
+const LOOKS: usize = 6;
+const TOO_FAR: f64 = 0.015;
 /// Particles that a worker measures at a time.
 const MEASURED: usize = 32;
+
+/// Labels of particles, as the swarm counts them.
+type Labels = BTreeSet<u32>;
 
 /// Some of a substance that hangs together.
 #[derive(Clone, Debug, PartialEq)]
@@ -226,7 +231,7 @@ impl World {
     /// particles.
     pub fn pieces(&self, body: BodyId) -> Result<Vec<Piece>> {
         let substance = self.substance(body)?;
-        let mut pieces: std::collections::BTreeMap<u32, Vec<usize>> = std::collections::BTreeMap::new();
+        let mut pieces: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
         for (place, particle) in substance.particles.iter().enumerate() {
             pieces.entry(particle.piece).or_default().push(place);
         }
@@ -468,7 +473,7 @@ impl World {
     fn list_contacts(&self, system: &System, motions: &[Motion], state: &mut Stepping) {
         let contacts: &mut Vec<Contact> = &mut state.substance_contacts;
         let origin = system.swarm.origin;
-        let mut sums: std::collections::BTreeMap<(u32, u32), usize> = std::collections::BTreeMap::new();
+        let mut sums: BTreeMap<(u32, u32), usize> = BTreeMap::new();
         system.contacts(motions, |own, _: &Obstacle, link, press| {
             let place = *sums.entry((own, link)).or_insert_with(|| {
                 let other = self.links[link as usize].body;
@@ -501,28 +506,34 @@ impl World {
         }
     }
 
-    /// Moves the offsets of particles. Whether volumes are still too far off to leave it there.
-    fn control_particles(&mut self, swarm: &mut Swarm, shares: &[Share]) -> bool {
-        let (mut first, mut worst) = (0, 0.0_f64);
+    /// Moves the offsets of the particles of some labels, or of all. Which of these were too far off to leave it there.
+    fn control_particles(&mut self, swarm: &mut Swarm, shares: &[Share], only: Option<&Labels>) -> Labels {
+        let (mut first, mut off) = (0, Labels::new());
         for matter in &swarm.matters {
             let Some(substance) = self.bodies[matter.body as usize].substance.as_deref_mut() else { continue };
             let own = first..first + substance.particles.len();
-            let offsets = &mut swarm.offset[own.clone()];
-            worst = worst.max(substance.control_volume(&shares[own.clone()], matter.profile.thickness, offsets));
+            let (offsets, labels) = (&mut swarm.offset[own.clone()], &swarm.label[own.clone()]);
+            let thickness = matter.profile.thickness;
+            off.extend(substance.control_volume(&shares[own.clone()], thickness, labels, only, offsets));
             first = own.end;
         }
-        worst > TOO_FAR
+        off
     }
 
     /// Volumes, offsets, pieces, bonds; and all back to the bodies.
     fn settle_substances(&mut self, system: &mut System, dt: f64, team: &Team) {
         let mut shares = vec![Share::default(); system.swarm.place.len()];
-        for _ in 0..LOOKS {
+        // All labels are looked at, then those whose volumes are too far off.
+        let mut off = Labels::new();
+        for look in 0..LOOKS {
             let swarm = &mut system.swarm;
             team.each_mut(&mut shares, MEASURED, |index, share| {
-                with_locale(|locale| measure(swarm, index, &swarm.matter_of(index).directions, locale, share));
+                if look == 0 || off.contains(&swarm.label[index]) {
+                    with_locale(|locale| measure(swarm, index, &swarm.matter_of(index).directions, locale, share));
+                }
             });
-            if !self.control_particles(swarm, &shares) {
+            off = self.control_particles(swarm, &shares, (look > 0).then_some(&off));
+            if off.is_empty() {
                 break;
             }
         }
@@ -585,12 +596,23 @@ impl World {
 
 impl Substance {
     /// The next offsets of its particles, so that each piece keeps its volume: what buried particles lack, those on the
-    /// surface make good. Gives the worst relative error of a piece.
-    fn control_volume(&mut self, shares: &[Share], thickness: f64, offsets: &mut [f64]) -> f64 {
-        let mut sums: std::collections::BTreeMap<u32, Sums> = std::collections::BTreeMap::new();
-        for (particle, share) in self.particles.iter_mut().zip(shares) {
+    /// surface make good: of some labels of the world, or of all. Gives those that were too far off.
+    fn control_volume(
+        &mut self,
+        shares: &[Share],
+        thickness: f64,
+        labels: &[u32],
+        only: Option<&Labels>,
+        offsets: &mut [f64],
+    ) -> Labels {
+        let mut sums: BTreeMap<u32, Sums> = BTreeMap::new();
+        let counts = |label: &u32| only.is_none_or(|only| only.contains(label));
+        for ((particle, share), label) in self.particles.iter_mut().zip(shares).zip(labels) {
+            if !counts(label) {
+                continue;
+            }
             let target = *particle.target.get_or_insert(share.volume);
-            let sums = sums.entry(particle.label).or_default();
+            let sums = sums.entry(*label).or_default();
             sums.target += target;
             sums.error += share.volume - target;
             sums.surface += share.exposed;
@@ -600,15 +622,16 @@ impl Substance {
         }
         let gain = self.desc.volume_gain;
         if gain == 0.0 {
-            return 0.0;
+            return Labels::new();
         }
-        for ((particle, share), offset) in self.particles.iter().zip(shares).zip(offsets) {
-            let Sums { lack, surface, .. } = sums[&particle.label];
+        for (((particle, share), label), offset) in self.particles.iter().zip(shares).zip(labels).zip(offsets) {
+            let Some(&Sums { lack, surface, .. }) = sums.get(label) else { continue };
             let missing = if surface > 0.0 { lack / surface } else { 0.0 };
             let target = particle.target.unwrap_or(share.volume);
             *offset = next_offset(*offset, gain, share, target, missing, thickness);
         }
-        sums.values().map(|sums| (sums.error / sums.target).abs()).fold(0.0, f64::max)
+        let is_off = |sums: &Sums| sums.error.abs() > TOO_FAR * sums.target;
+        sums.into_iter().filter(|(_, sums)| is_off(sums)).map(|(label, _)| label).collect()
     }
 }
 
