@@ -32,7 +32,7 @@
 // Held       Every tick the coupler sees which bodies are held: by enabled constraints, and by contacts of their shapes.
 //            isocoat solves what these touch implicitly: it rests soundly, and bounces less than free bodies do. While
 //            one of the bodies that constraints join touches, the coupler works out from the constraints' rows how it
-//            answers pushes, and it may carry any load. For that it asks each constraint once more a tick for its rows.
+//            answers pushes, so that it may carry any load; it asks each constraint once more a tick for its rows.
 //            Where several touch at once, or contacts of Bullet's own hold a body, what holds it is estimated: stable
 //            while the body with its joints is at most ten times as heavy as without them, where its coat is.
 // Limits     Bullet's joint limits are no places to rest at. By default a hinge bounces off them, and a limit has a row
@@ -245,6 +245,10 @@ private:
     /// Part of what was missing in a tick that goes into the estimate of it: stable while a body answers a push at
     /// least a tenth as readily as isocoat is told.
     static constexpr double learned = 0.1;
+
+    /// A body that answers pushes with its joints by less than this part of what it would without is heavy: the
+    /// estimate of what holds it is stable down to a tenth. The others keep it, which damps better what swings fast.
+    static constexpr double heavy = 0.15;
 
     std::size_t find(const btRigidBody *body) const {
         const auto found = of_body_.find(body);
@@ -475,8 +479,8 @@ private:
                                                       acceleration.data() + 3) == ISOCOAT_OK;
     }
 
-    /// Tells isocoat how bodies on joints answer pushes, and what the joints let them do by themselves. Bodies that
-    /// sleep stay as they were told.
+    /// Tells isocoat how heavy bodies on joints answer pushes, and what the joints let them do by themselves. Bodies
+    /// that sleep stay as they were told.
     void tell_joints(btScalar dt) {
         joints_.find(*dynamics_);
         for (const std::size_t i : movers_) {
@@ -494,13 +498,20 @@ private:
                 continue;
             }
             const detail::joints::member *one = joints_.of(entry.body);
-            if (one != nullptr && one->solved) {
+            if (one != nullptr && one->solved && needs_joints(entry, *one)) {
                 tell_joints_of(entry, *one, dt);
             } else if (entry.jointed) {
                 describe_again(entry, entry.response);
                 (void)tell_acceleration(entry, detail::six(entry.expected));
             }
         }
+    }
+
+    /// Whether joints make a body so much heavier, where it is pushed, that an estimate of what holds it is at stake.
+    static bool needs_joints(const attachment &entry, const detail::joints::member &one) {
+        const double free = detail::dot(entry.pushed, detail::product(one.lone, entry.pushed));
+        const double held = detail::dot(entry.pushed, detail::product(one.mobility, entry.pushed));
+        return entry.touching > 0 && held < (entry.jointed ? 2.0 : 1.0) * heavy * free;
     }
 
     void tell_joints_of(attachment &entry, const detail::joints::member &one, btScalar dt) {
@@ -644,7 +655,9 @@ private:
     static void await(attachment &entry, const detail::vector6 &impulse) {
         const bool touched = std::any_of(impulse.begin(), impulse.end(), [](double x) { return x != 0.0; });
         entry.touching = touched ? held_ticks : std::max(entry.touching - 1, 0);
-        entry.pushed = impulse;
+        if (touched || entry.touching == 0) {
+            entry.pushed = impulse;
+        }
         const detail::vector6 change = detail::product(entry.mobility, impulse);
         for (std::size_t i = 0; i < 6; ++i) {
             entry.awaited[i] += change[i];

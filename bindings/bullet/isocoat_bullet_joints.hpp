@@ -6,9 +6,9 @@
 // The rows of all enabled constraints of an island, J u = r - C l with impulses l between bounds, are those that
 // Bullet's solver is about to get: the constraints are asked for them at the poses in which the tick begins. With the
 // inverse masses W, and S = J W J^T + C over the rows that are at work, a push on the bodies changes their velocities
-// by A = W - W J^T S^-1 J W, of which isocoat gets the 6x6 block of each body. Bullet's solver comes near that solution in
-// as many iterations as its host gives it. Bodies of one island that touch at once move each other, which no matrix of
-// one of them says: such islands are left out, and what holds their bodies is estimated.
+// by A = W - W J^T S^-1 J W, of which isocoat gets the 6x6 block of each body. Bullet's solver comes near that solution
+// in as many iterations as its host gives it. Bodies of one island that touch at once move each other, which no matrix
+// of one of them says: such islands are left out, and what holds their bodies is estimated.
 #ifndef ISOCOAT_BULLET_JOINTS_HPP
 #define ISOCOAT_BULLET_JOINTS_HPP
 
@@ -29,6 +29,14 @@ namespace detail {
 
 using vector6 = std::array<double, 6>;
 using matrix6 = std::array<double, 36>;
+
+inline double dot(const vector6 &a, const vector6 &b) {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < 6; ++i) {
+        sum += a[i] * b[i];
+    }
+    return sum;
+}
 
 inline vector6 product(const matrix6 &m, const vector6 &v) {
     vector6 out{};
@@ -246,14 +254,6 @@ private:
             made.upper = double(std::min(from[19], breaking));
             rows_.push_back(made);
         }
-    }
-
-    static double dot(const vector6 &a, const vector6 &b) {
-        double sum = 0.0;
-        for (std::size_t i = 0; i < 6; ++i) {
-            sum += a[i] * b[i];
-        }
-        return sum;
     }
 
     /// What the row's velocity is at these velocities of the bodies.

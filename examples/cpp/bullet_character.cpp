@@ -3,9 +3,9 @@
 //
 //     bullet_character [folder for pictures]
 //
-// Exits with 0 when it has touched itself on the way and lies on the stairs at the end. It does not lie quite still: its
-// joints are Bullet's, solved apart from the contacts, and with many limbs touching, each one's load through them is an
-// estimate. For the bar of a body at rest, 1 mm and 1 mm/s in a minute, see what it prints.
+// Exits with 0 when it has touched itself on the way and lies on the stairs at the end. It does not lie quite still:
+// its joints are Bullet's, solved apart from the contacts, and with many limbs touching, each one's load through them is an
+// estimate. For the bar of a body at rest, 1 mm and 1 mm/s in a minute, it is still too restless.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
