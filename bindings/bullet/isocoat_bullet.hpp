@@ -30,10 +30,15 @@
 // Core       A coat does not replace the body's shape. Filter the shapes against those of coat partners
 //            (add_coated_body or ignore_core), let them collide with the plain world, and see enable_ccd.
 // Held       Every tick the coupler sees which bodies are held: by enabled constraints, and by contacts of their shapes.
-//            isocoat solves what these touch implicitly: it rests soundly, and bounces less than free bodies do. What
-//            holds a body is estimated. That is stable while the body with its joints is at most ten times as heavy as
-//            without them, where its coat is: do not hang 20 kg on 1 kg. Links of multibodies have no such bound, see
-//            isocoat_bullet_multibody.hpp.
+//            isocoat solves what these touch implicitly: it rests soundly, and bounces less than free bodies do. While
+//            one of the bodies that constraints join touches, the coupler works out from the constraints' rows how it
+//            answers pushes, so that it may carry any load; it asks each constraint once more a tick for its rows.
+//            Where several touch at once, or contacts of Bullet's own hold a body, what holds it is estimated: stable
+//            while the body with its joints is at most ten times as heavy as without them, where its coat is.
+// Limits     Bullet's joint limits are no places to rest at. By default a hinge bounces off them, and a limit has a row
+//            only while it is passed: a link that leans on one moves by 0.1 m/s for ever, without any coat. Let limits
+//            give a little: hinge.setLimit(low, high, 0.9, 0.3, 0), hinge.setParam(BT_CONSTRAINT_STOP_CFM, 0.3),
+//            cone_twist.setParam(BT_CONSTRAINT_CFM, 0.3, 3).
 // Sleep      Bodies that touch through their coats fall asleep together. A sleeping body keeps its coat: it is pressed
 //            and presses back, but stays where it is. It wakes when what the coat asks of it changes: a new push, or
 //            support that goes away. A pile at rest stays asleep. While everything sleeps, the isocoat world is
@@ -49,6 +54,7 @@
 #define ISOCOAT_BULLET_HPP
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -66,6 +72,7 @@
 #include <isocoat/isocoat.h>
 
 #include "isocoat_bullet_bodies.hpp"
+#include "isocoat_bullet_joints.hpp"
 
 namespace isocoat {
 namespace bullet {
@@ -210,6 +217,16 @@ private:
         detail::motion told;
         /// Accelerations as isocoat was told.
         detail::motion expected;
+        /// isocoat was told how the body answers pushes with its joints, and with which acceleration.
+        bool jointed = false;
+        std::array<double, 36> mobility{};
+        detail::vector6 acceleration{};
+        /// Velocities that it should have at the next tick, and what was missing, as an acceleration.
+        detail::vector6 awaited{};
+        detail::vector6 missing{};
+        /// The last impulse of its contacts, and for how many ticks it counts as touching still.
+        detail::vector6 pushed{};
+        int touching = 0;
         /// Sleeping bodies: what gravity and contacts usually add to the velocities in a tick; what came beyond.
         detail::motion usual;
         detail::motion owed;
@@ -224,6 +241,14 @@ private:
 
     /// A contact that rattles comes and goes from tick to tick: a body counts as held for some ticks more.
     static constexpr int held_ticks = 6;
+
+    /// Part of what was missing in a tick that goes into the estimate of it: stable while a body answers a push at
+    /// least a tenth as readily as isocoat is told.
+    static constexpr double learned = 0.1;
+
+    /// A body that answers pushes with its joints by less than this part of what it would without is heavy: the
+    /// estimate of what holds it is stable down to a tenth. The others keep it, which damps better what swings fast.
+    static constexpr double heavy = 0.15;
 
     std::size_t find(const btRigidBody *body) const {
         const auto found = of_body_.find(body);
@@ -275,6 +300,7 @@ private:
         if (rests()) {
             return;
         }
+        tell_joints(dt);
         before_step(dt);
         detail::check(isocoat_world_step(world_, double(dt)), "step");
         apply(dt);
@@ -359,6 +385,7 @@ private:
             if (entry.jumped || entry.asleep) {
                 // A link that is gone shows in push_states.
                 (void)(isocoat_link_teleport(world_, entry.link, &state) == ISOCOAT_OK);
+                entry.touching = entry.jumped ? 0 : entry.touching;
                 entry.jumped = false;
             }
             links_.push_back(entry.link);
@@ -373,13 +400,14 @@ private:
         const btRigidBody &body = *entry.body;
         const detail::response now = detail::response::of(body);
         // The matrix of a body that is held in some direction turns with it.
-        const bool turned = now.is_dynamic() && !now.is_free() && !(body.getWorldTransform().getBasis() == entry.basis);
+        const bool turned = now.is_dynamic() && !now.is_free() && !entry.jointed &&
+                            !(body.getWorldTransform().getBasis() == entry.basis);
         const bool constrained = entry.held > 0 && now.is_dynamic();
         const bool changed = constrained != entry.constrained;
         entry.constrained = constrained;
-        if (turned || !(now == entry.response) || (changed && !now.is_free())) {
+        if (turned || !(now == entry.response) || (changed && !now.is_free() && !entry.jointed)) {
             describe_again(entry, now);
-        } else if (changed) {
+        } else if (changed && !entry.jointed) {
             // A link that is gone shows in push_states.
             (void)(isocoat_link_set_constrained(world_, entry.link, constrained) == ISOCOAT_OK);
         }
@@ -396,7 +424,8 @@ private:
             expect(entry, slept);
             if (entry.asleep) {
                 // At rest in the middle of the tick: isocoat adds half a tick's gravity to a leapfrog velocity.
-                entry.told = detail::motion{entry.expected.linear * (btScalar(-0.5) * dt), btVector3(0, 0, 0)};
+                const btScalar ahead = entry.jointed ? btScalar(0) : btScalar(-0.5) * dt;
+                entry.told = detail::motion{entry.expected.linear * ahead, btVector3(0, 0, 0)};
             }
         }
         state.pose = detail::pose_from(pose);
@@ -418,6 +447,7 @@ private:
         if (isocoat_link_set_desc(world_, entry.link, &desc) == ISOCOAT_OK) {
             entry.response = now;
             entry.basis = entry.body->getWorldTransform().getBasis();
+            entry.jointed = false;
         } else {
             report("isocoat: a body's new mass or inertia is refused: " + detail::last_error());
         }
@@ -439,12 +469,74 @@ private:
         if (expected.linear == entry.expected.linear && expected.angular == entry.expected.angular) {
             return;
         }
-        double linear[3];
-        double angular[3];
-        detail::copy(expected.linear, linear);
-        detail::copy(expected.angular, angular);
-        if (isocoat_link_set_external_acceleration(world_, entry.link, linear, angular) == ISOCOAT_OK) {
+        if (entry.jointed || tell_acceleration(entry, detail::six(expected))) {
             entry.expected = expected;
+        }
+    }
+
+    bool tell_acceleration(const attachment &entry, const detail::vector6 &acceleration) {
+        return isocoat_link_set_external_acceleration(world_, entry.link, acceleration.data(),
+                                                      acceleration.data() + 3) == ISOCOAT_OK;
+    }
+
+    /// Tells isocoat how heavy bodies on joints answer pushes, and what the joints let them do by themselves. Bodies
+    /// that sleep stay as they were told.
+    void tell_joints(btScalar dt) {
+        joints_.find(*dynamics_);
+        for (const std::size_t i : movers_) {
+            const attachment &entry = entries_[i];
+            if (detail::joints::member *one = joints_.of(entry.body)) {
+                one->external = detail::six(entry.expected);
+                one->pushed = entry.pushed;
+                one->touching = entry.touching > 0;
+            }
+        }
+        joints_.solve(*dynamics_, dt);
+        for (const std::size_t i : movers_) {
+            attachment &entry = entries_[i];
+            if (entry.asleep && entry.jointed) {
+                continue;
+            }
+            const detail::joints::member *one = joints_.of(entry.body);
+            if (one != nullptr && one->solved && needs_joints(entry, *one)) {
+                tell_joints_of(entry, *one, dt);
+            } else if (entry.jointed) {
+                describe_again(entry, entry.response);
+                (void)tell_acceleration(entry, detail::six(entry.expected));
+            }
+        }
+    }
+
+    /// Whether joints make a body so much heavier, where it is pushed, that an estimate of what holds it is at stake.
+    static bool needs_joints(const attachment &entry, const detail::joints::member &one) {
+        const double free = detail::dot(entry.pushed, detail::product(one.lone, entry.pushed));
+        const double held = detail::dot(entry.pushed, detail::product(one.mobility, entry.pushed));
+        return entry.touching > 0 && held < (entry.jointed ? 2.0 : 1.0) * heavy * free;
+    }
+
+    void tell_joints_of(attachment &entry, const detail::joints::member &one, btScalar dt) {
+        const detail::vector6 velocity = detail::six(entry.told);
+        for (std::size_t i = 0; i < 6; ++i) {
+            // Bullet solves joints in a few iterations, and contacts of its own may hold the body as well.
+            const bool goes_on = entry.jointed && entry.touching > 0;
+            const double off = velocity[i] - entry.awaited[i];
+            entry.missing[i] = goes_on ? entry.missing[i] + off * (learned / double(dt)) : 0.0;
+            entry.acceleration[i] = one.acceleration[i] + entry.missing[i];
+            entry.awaited[i] = velocity[i] + entry.acceleration[i] * double(dt);
+        }
+        isocoat_link_desc desc = isocoat_link_desc_default();
+        if (isocoat_link_get_desc(world_, entry.link, &desc) != ISOCOAT_OK) {
+            return;  // shows when its state is set
+        }
+        desc.flags |= ISOCOAT_LINK_CONSTRAINED | ISOCOAT_LINK_HAS_INVERSE_EFFECTIVE_INERTIA;
+        std::copy(one.mobility.begin(), one.mobility.end(), desc.inverse_effective_inertia);
+        std::copy(entry.acceleration.begin(), entry.acceleration.begin() + 3, desc.external_acceleration);
+        std::copy(entry.acceleration.begin() + 3, entry.acceleration.end(), desc.external_angular_acceleration);
+        if (isocoat_link_set_desc(world_, entry.link, &desc) == ISOCOAT_OK) {
+            entry.jointed = true;
+            entry.mobility = one.mobility;
+        } else {
+            report("isocoat: how a body on joints answers pushes is refused: " + detail::last_error());
         }
     }
 
@@ -550,9 +642,25 @@ private:
             }
             const double *numbers = impulses_.data() + 6 * i;
             const detail::motion impulse{detail::vector_from(numbers), detail::vector_from(numbers + 3)};
+            if (!entry.asleep) {
+                await(entry, detail::six(impulse));
+            }
             if (!entry.asleep || stirs(entry, dt)) {
                 push(entry, impulse);
             }
+        }
+    }
+
+    /// Notes what contacts do to a body.
+    static void await(attachment &entry, const detail::vector6 &impulse) {
+        const bool touched = std::any_of(impulse.begin(), impulse.end(), [](double x) { return x != 0.0; });
+        entry.touching = touched ? held_ticks : std::max(entry.touching - 1, 0);
+        if (touched || entry.touching == 0) {
+            entry.pushed = impulse;
+        }
+        const detail::vector6 change = detail::product(entry.mobility, impulse);
+        for (std::size_t i = 0; i < 6; ++i) {
+            entry.awaited[i] += change[i];
         }
     }
 
@@ -704,6 +812,7 @@ private:
     std::vector<isocoat_link_state> states_;
     std::vector<std::size_t> movers_;
     std::vector<double> impulses_;
+    detail::joints joints_;
     /// Links and states of the last tick, and for how many ticks they have been so.
     std::vector<std::pair<isocoat_link, isocoat_link_state>> rested_;
     unsigned resting_ = 0;

@@ -170,13 +170,16 @@ private:
             // Bullet's hinges turn about z of their frames.
             const btQuaternion turn = shortestArcQuat(btVector3(0, 0, 1), btVector3(1, 0, 0));
             auto hinge = std::make_unique<btHingeConstraint>(parent, child, frame(parent, turn), frame(child, turn));
-            hinge->setLimit(btScalar(-1.2), btScalar(0.1));
+            // No bounce, and a stop that gives a little: at a hard one nothing rests in Bullet, with coats or without.
+            hinge->setLimit(btScalar(-1.2), btScalar(0.1), btScalar(0.9), btScalar(0.3), 0);
+            hinge->setParam(BT_CONSTRAINT_STOP_CFM, btScalar(0.3));
             joint = std::move(hinge);
         } else {
             // Cone-twist joints twist about x of theirs.
             const btQuaternion turn = shortestArcQuat(btVector3(1, 0, 0), along);
             auto cone = std::make_unique<btConeTwistConstraint>(parent, child, frame(parent, turn), frame(child, turn));
             cone->setLimit(btScalar(0.9), btScalar(0.9), btScalar(0.3));
+            cone->setParam(BT_CONSTRAINT_CFM, btScalar(0.3), 3);
             joint = std::move(cone);
         }
         dynamics_.addConstraint(joint.get(), true);
