@@ -84,7 +84,7 @@ static int picture_write(const isocoat_world *world, const picture_view *view, u
                 const double light = picture_dot(hit.normal, lamp);
                 const double shade = 0.35 + (shaded || light < 0.0 ? 0.0 : 0.6 * light);
                 /* What has no skeletons has a colour as a body. */
-                picture_colour(hit.skeleton.generation ? hit.skeleton.index : ~hit.body.index, colour);
+                picture_colour(hit.skeleton.generation ? hit.skeleton.index : hit.body.index + 100u, colour);
                 for (int k = 0; k < 3; ++k) {
                     colour[k] *= shade;
                 }

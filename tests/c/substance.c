@@ -25,6 +25,7 @@ static isocoat_substance_desc clay(void)
     desc.spacing = SPACING;
     desc.particle_mass = 1000.0 * SPACING * SPACING * SPACING / sqrt(2.0);
     desc.cohesion = 200.0 * desc.particle_mass * GRAVITY * SPACING;
+    desc.damping = 1.0;
     return desc;
 }
 
@@ -35,6 +36,7 @@ static isocoat_body new_substance(isocoat_world *world, const isocoat_substance_
     body_desc.stiffness_scale = 2e4;
     body_desc.friction = 0.6;
     body_desc.static_friction = 0.8;
+    body_desc.dissipation = 2.0;
     OK(isocoat_body_create(world, &body_desc, &body));
     OK(isocoat_body_make_substance(world, body, desc));
     return body;
@@ -239,12 +241,12 @@ static void what_makes_no_sense_is_refused_and_changes_nothing(void)
     isocoat_piece pieces[2];
     const isocoat_change *changes = NULL;
     const isocoat_particle *changed = NULL;
-    double before, after;
+    double before[2][3], after[2][3];
     size_t count = 99, fill = 99;
 
     OK(isocoat_substance_add_particles(world, body, vertices[0], NULL, 2, names));
     twice[0] = twice[1] = names[0];
-    OK(isocoat_body_get_volume(world, body, &before));
+    OK(isocoat_substance_get_particles(world, body, NULL, into(before[0]), none(), NULL, NULL, NULL, 2, &count));
 
     REFUSED(isocoat_substance_add_particles(world, body, NULL, NULL, 1, NULL), argument, "positions is NULL");
     REFUSED(isocoat_substance_add_particles(world, body, two[0], NULL, 2, row), range, "positions[1]: position");
@@ -287,8 +289,9 @@ static void what_makes_no_sense_is_refused_and_changes_nothing(void)
     twice[1] = 0;
     REFUSED(isocoat_substance_remove_particles(world, body, twice, 2), handle, "particles[1]: particle");
     CHECK(count_of(world, body) == 2);
-    OK(isocoat_body_get_volume(world, body, &after));
-    CHECK(before == after);
+    OK(isocoat_substance_get_particles(world, body, NULL, into(after[0]), none(), NULL, NULL, NULL, 2, &count));
+    CHECK(memcmp(before, after, sizeof before) == 0);
+    count = 99;
 
     REFUSED(isocoat_substance_get_particle_count(world, plain, &count), unsupported, "not a substance");
     REFUSED(isocoat_substance_get_particle_count(world, body, NULL), argument, "count is NULL");
@@ -348,7 +351,8 @@ static void a_force_moves_its_particle(void)
 
 static void a_lump_falls_on_a_plane_and_keeps_its_volume_and_its_weight(void)
 {
-    VEC(center, 0.0, 0.0, 0.25);
+    VEC(low, -0.15, -0.15, 0.1);
+    VEC(high, 0.15, 0.15, 0.3);
     VEC(above, 0.0, 0.0, 2.0);
     VEC(down, 0.0, 0.0, -1.0);
     const double dt = 1.0 / 60.0;
@@ -368,7 +372,7 @@ static void a_lump_falls_on_a_plane_and_keeps_its_volume_and_its_weight(void)
     int step;
 
     new_ground(world);
-    OK(isocoat_substance_fill_ball(world, body, center, 0.2, &n));
+    OK(isocoat_substance_fill_box(world, body, low, high, &n));
     CHECK(n > 100 && count_of(world, body) == n);
     names = malloc(n * sizeof *names);
     speeds = malloc(n * sizeof *speeds);
@@ -400,7 +404,7 @@ static void a_lump_falls_on_a_plane_and_keeps_its_volume_and_its_weight(void)
     CHECK(count == 1 && piece.particle_count == n && piece.reserved == 0);
     CHECK_NEAR(piece.volume / first, 1.0, 0.03);
     CHECK_NEAR(piece.mass / ((double)n * desc.particle_mass), 1.0, 1e-12);
-    CHECK(piece.center[2] > 0.05 && piece.center[2] < 0.25);
+    CHECK(piece.center[2] > 0.05 && piece.center[2] < 0.12);
     OK(isocoat_substance_get_piece_particles(world, body, 0, names, n, &count));
     CHECK(count == n);
 
@@ -416,8 +420,8 @@ static void a_lump_falls_on_a_plane_and_keeps_its_volume_and_its_weight(void)
     isocoat_world_destroy(world);
 }
 
-/* Two lumps move towards each other without gravity. Gives the pieces in the end, and how often who began to fuse. */
-static size_t meet(double fusion_threshold, size_t *fused, size_t *labels_left)
+/* Two lumps move towards each other without gravity. Gives the pieces in the end, and how many pairs began to fuse. */
+static size_t meet(double fusion_threshold, size_t *fused)
 {
     VEC(left, -0.14, 0.0, 0.0);
     VEC(right, 0.14, 0.0, 0.0);
@@ -462,8 +466,6 @@ static size_t meet(double fusion_threshold, size_t *fused, size_t *labels_left)
         if (step == 0) CHECK(pieces_of(world, body) == 2);
     }
     pieces = pieces_of(world, body);
-    OK(isocoat_substance_get_particles(world, body, NULL, none(), none(), NULL, NULL, labels, n, &count));
-    for (i = 1, *labels_left = 1; i < n; ++i) *labels_left += labels[i] != labels[i - 1];
     free(labels);
     free(speeds);
     free(names);
@@ -473,11 +475,11 @@ static size_t meet(double fusion_threshold, size_t *fused, size_t *labels_left)
 
 static void lumps_fuse_as_the_threshold_says(void)
 {
-    size_t fused, labels;
-    CHECK(meet(0.0, &fused, &labels) == 1);
-    CHECK(fused > 0 && labels == 1);
-    CHECK(meet(INFINITY, &fused, &labels) == 2);
-    CHECK(fused == 0 && labels == 2);
+    size_t fused;
+    CHECK(meet(0.0, &fused) == 1);
+    CHECK(fused > 0);
+    CHECK(meet(INFINITY, &fused) == 2);
+    CHECK(fused == 0);
 }
 
 /* Half of a row of particles is put elsewhere: it comes off, with an event that names it. */

@@ -301,7 +301,7 @@ static void substances()
     CHECK(names.size() == 3 && clay.particle_count() == 3 && clay.add({}).empty());
     CHECK(world.substance_changes().changes.empty());
     world.step(0.01);
-    CHECK(clay.pieces().size() == 1 && clay.pieces()[0].particle_count == 3 && clay.volume() > 0.0);
+    CHECK(clay.pieces().size() == 1 && clay.pieces()[0].particle_count == 3 && clay.pieces()[0].volume > 0.0);
 
     clay.set_particles({&names[2], 1}, std::vector<isocoat::vec3>{{1, 0, 0}});
     clay.set_particles({&names[2], 1}, {}, std::vector<isocoat::vec3>{{0, 1, 0}});
