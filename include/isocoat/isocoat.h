@@ -2137,15 +2137,14 @@ isocoat_status isocoat_world_overlap_sphere(const isocoat_world *world,
                                             size_t *count);
 
 /**
- * The point of a body's surface that is closest to a point of the world. On a substance, link and skeleton
- * are null.
+ * The point of a body's surface that is closest to a point of the world. On a substance, link and
+ * skeleton are null.
  *
  * - world: not NULL.
  * - body: the body; it may be disabled.
  * - point: 3 doubles, in m, finite; not NULL. It may be inside.
  * - closest: receives the closest point, if there is one; not NULL.
- * - found: receives whether there is one: not for a body without enabled skeletons or
- *   particles; not NULL.
+ * - found: receives whether there is one: not for a body without enabled skeletons or particles; not NULL.
  *
  * Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE. Threads: reads the world.
  */
@@ -2164,8 +2163,7 @@ isocoat_status isocoat_body_closest_point(const isocoat_world *world,
  * - point: 3 doubles, in m, finite; not NULL. It may be inside.
  * - deformation: which shape, an ISOCOAT_DEFORMATION_ value.
  * - closest: receives the closest point, if there is one; not NULL.
- * - found: receives whether there is one: not for a body without enabled skeletons or
- *   particles; not NULL.
+ * - found: receives whether there is one: not for a body without enabled skeletons or particles; not NULL.
  *
  * Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE. Threads: reads the world.
  */

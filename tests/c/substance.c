@@ -1,6 +1,8 @@
 /* Substances: lumps that fall, rest, fuse and come apart; what their calls refuse. */
 #include "check.h"
 
+#include <stddef.h>
+
 static const double GRAVITY = 9.81, SPACING = 0.05;
 static const isocoat_status argument = ISOCOAT_ERROR_INVALID_ARGUMENT, range = ISOCOAT_ERROR_OUT_OF_RANGE;
 static const isocoat_status handle = ISOCOAT_ERROR_INVALID_HANDLE, unsupported = ISOCOAT_ERROR_UNSUPPORTED;
@@ -351,19 +353,19 @@ static void a_force_moves_its_particle(void)
 
 static void a_lump_falls_on_a_plane_and_keeps_its_volume_and_its_weight(void)
 {
-    VEC(low, -0.15, -0.15, 0.1);
-    VEC(high, 0.15, 0.15, 0.3);
+    VEC(low, -0.15, -0.12, 0.05);
+    VEC(high, 0.15, 0.12, 0.22);
     VEC(above, 0.0, 0.0, 2.0);
     VEC(down, 0.0, 0.0, -1.0);
     const double dt = 1.0 / 60.0;
-    const isocoat_substance_desc desc = clay();
+    isocoat_substance_desc desc = clay();
     isocoat_world *world = heavy_world();
-    const isocoat_body body = new_substance(world, &desc);
+    isocoat_body body;
     const isocoat_contact *contacts;
     isocoat_particle *names;
     double (*speeds)[3], *volumes;
     double first = 0.0, worst = 0.0, carried = 0.0, fastest = 0.0;
-    const int steps = 180, averaged = 30;
+    const int steps = 150, averaged = 30;
     isocoat_piece piece;
     isocoat_ray_hit hit;
     isocoat_surface_point closest;
@@ -371,9 +373,12 @@ static void a_lump_falls_on_a_plane_and_keeps_its_volume_and_its_weight(void)
     size_t count = 0, n, i;
     int step;
 
+    /* Gently, so that the surface does not tremble by millimetres a second. */
+    desc.volume_gain = 0.1;
+    body = new_substance(world, &desc);
     new_ground(world);
     OK(isocoat_substance_fill_box(world, body, low, high, &n));
-    CHECK(n > 100 && count_of(world, body) == n);
+    CHECK(n > 50 && count_of(world, body) == n);
     names = malloc(n * sizeof *names);
     speeds = malloc(n * sizeof *speeds);
     volumes = malloc(n * sizeof *volumes);
@@ -399,7 +404,7 @@ static void a_lump_falls_on_a_plane_and_keeps_its_volume_and_its_weight(void)
     CHECK(first > 0.0);
     CHECK_NEAR(worst, 0.0, 0.03);
     CHECK_NEAR(fastest, 0.0, 1e-2);
-    CHECK_NEAR(carried / ((double)n * desc.particle_mass * GRAVITY), 1.0, 0.02);
+    CHECK_NEAR(carried / ((double)n * desc.particle_mass * GRAVITY), 1.0, 0.01);
     OK(isocoat_substance_get_pieces(world, body, &piece, 1, &count));
     CHECK(count == 1 && piece.particle_count == n && piece.reserved == 0);
     CHECK_NEAR(piece.volume / first, 1.0, 0.03);
@@ -448,7 +453,7 @@ static size_t meet(double fusion_threshold, size_t *fused)
     for (i = 0; i < n; ++i) speeds[i][0] = i < half ? 0.25 : -0.25;
     OK(isocoat_substance_set_particles(world, body, names, NULL, speeds[0], n));
     *fused = 0;
-    for (step = 0; step < 120; ++step) {
+    for (step = 0; step < 60; ++step) {
         const isocoat_change *changes = NULL;
         const isocoat_particle *changed = NULL;
         OK(isocoat_world_step(world, 1.0 / 60.0));
@@ -518,6 +523,31 @@ static void what_is_torn_off_is_told(void)
     isocoat_world_destroy(world);
 }
 
+/* The time of substances came at the end of its struct: a host that does not know it keeps what it has there. */
+static void times_tell_of_substances_who_asks_for_them(void)
+{
+    VEC(center, 0.0, 0.0, 0.0);
+    isocoat_world_desc world_desc = isocoat_world_desc_default();
+    const isocoat_substance_desc desc = clay();
+    isocoat_world *world = NULL;
+    isocoat_times times = isocoat_times_default();
+    isocoat_body body;
+    size_t count = 0;
+    world_desc.timed = 1;
+    OK(isocoat_world_create(&world_desc, &world));
+    body = new_substance(world, &desc);
+    OK(isocoat_substance_fill_ball(world, body, center, 0.15, &count));
+    OK(isocoat_world_step(world, 1.0 / 60.0));
+    OK(isocoat_world_get_times(world, &times));
+    CHECK(times.substances > 0.0 && times.substances <= times.step);
+    times.struct_size = offsetof(isocoat_times, substances);
+    times.substances = -7.0;
+    times.step = 0.0;
+    OK(isocoat_world_get_times(world, &times));
+    CHECK(times.step > 0.0 && times.substances == -7.0 && times.struct_size == offsetof(isocoat_times, substances));
+    isocoat_world_destroy(world);
+}
+
 int main(void)
 {
     descriptors_come_back_and_are_checked();
@@ -527,5 +557,6 @@ int main(void)
     a_lump_falls_on_a_plane_and_keeps_its_volume_and_its_weight();
     lumps_fuse_as_the_threshold_says();
     what_is_torn_off_is_told();
+    times_tell_of_substances_who_asks_for_them();
     return verdict("substance");
 }
