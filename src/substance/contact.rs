@@ -19,6 +19,12 @@ const MERIDIANS: usize = 8;
 /// Gauss-Legendre on (0, 1).
 const NODES: [(f64, f64); 3] =
     [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
+/// Half angle of the widest fan.
+const WIDEST: f64 = 1.4;
+/// Steps towards the deepest point.
+const CLIMBS: usize = 4;
+/// Farthest that it may be, over the radius: beyond, the particle's share is too small to count.
+const FARTHEST: f64 = 0.9;
 /// Rounds of Newton's method along a ray.
 const ROUNDS: usize = 8;
 /// Closest that the surface may come to a particle, over its thickness: nearer, it is pushed out.
@@ -107,12 +113,17 @@ struct Node {
     apart: f64,
     /// Stiffness an area along the normal \[Pa/m\].
     rate: f64,
+    /// How the pressure's `σ` rises along the surface.
+    rise: Vec3,
 }
 
 struct Fan<'a, 'b> {
     center: Vec3,
     isovalue: f64,
     radius: f64,
+    thickness: f64,
+    /// Distance of the foot.
+    straight: f64,
     stiffness: Stiffness,
     opposite: &'a Opposite<'b>,
     locale: &'a mut Locale,
@@ -166,8 +177,8 @@ impl Fan<'_, '_> {
         let n = area.normalize();
         let steep = self.stiffness.own * gradient.dot(&n).abs();
         let (_, wb, _) = self.stiffness.weights();
-        let (sum, rate, apart) = if self.stiffness.other.is_infinite() {
-            (alpha, steep, 1.0)
+        let (sum, rate, apart, rise) = if self.stiffness.other.is_infinite() {
+            (alpha, steep, 1.0, gradient)
         } else {
             let (beta, slope) = self.opposite.excess(self.locale, &p);
             let others = self.stiffness.other * slope.dot(&n).abs();
@@ -177,14 +188,56 @@ impl Fan<'_, '_> {
                 }
                 _ => 1.0,
             };
-            (alpha / wb, steep * others / (steep + others).max(1e-300), apart)
+            (alpha / wb, steep * others / (steep + others).max(1e-300), apart, gradient + slope)
         };
+        let rise = rise - n * rise.dot(&n);
         let share = if own > 0.0 { self.locale.self_value(&p) / own } else { 0.0 };
-        Some((r, Node { p, area: area * (r * r), sum, share, apart, rate }))
+        Some((r, Node { p, area: area * (r * r), sum, share, apart, rate, rise }))
+    }
+
+    /// The deepest point of the contact that is near the way along `axis`: light contacts are small, and need not be on
+    /// the way to their particles. Its direction, its distance, and what is there.
+    fn deepest(&mut self, mut axis: Vec3, guess: f64) -> Option<(Vec3, f64, Node)> {
+        let (mut foot, mut node) = self.node(&axis, guess)?;
+        self.straight = foot.max(CLOSEST * self.thickness);
+        if node.sum > 0.0 {
+            return Some((axis, foot, node));
+        }
+        let mut last: Option<(Vec3, Vec3)> = None;
+        for _ in 0..CLIMBS {
+            // Secant on the rise, from the curvature of one field.
+            let usual = foot * foot / (2.0 * self.isovalue);
+            let rate = match last {
+                Some((place, rise)) => {
+                    let (way, change) = (node.p - place, rise - node.rise);
+                    let fall = way.dot(&change);
+                    if fall > 0.0 { way.norm_squared() / fall } else { 2.0 * usual }
+                }
+                None => usual,
+            };
+            let mut step = node.rise * rate;
+            let most = 0.5 * foot;
+            if step.norm() > most {
+                step *= most / step.norm();
+            }
+            let to = node.p + step - self.center;
+            if step.norm() < 0.02 * foot || to.norm() > FARTHEST * self.radius {
+                break;
+            }
+            last = Some((node.p, node.rise));
+            let next = to.normalize();
+            match self.node(&next, to.norm()) {
+                Some((distance, found)) if found.sum > node.sum && distance < FARTHEST * self.radius => {
+                    (axis, foot, node) = (next, distance, found);
+                }
+                _ => break,
+            }
+        }
+        Some((axis, foot, node))
     }
 }
 
-/// What presses on a particle from the direction `axis`; `guess` is how far the surface may be.
+/// What presses on a particle from about the direction `axis`; `guess` is how far the surface may be.
 pub fn press(
     locale: &mut Locale,
     center: Vec3,
@@ -194,25 +247,29 @@ pub fn press(
     stiffness: Stiffness,
     opposite: &Opposite,
 ) -> Press {
-    let mut fan = Fan { center, isovalue, radius, stiffness, opposite, locale };
+    let mut fan = Fan { center, isovalue, radius, thickness, straight: 0.0, stiffness, opposite, locale };
     let (_, _, scale) = stiffness.weights();
     let mut press = Press::default();
-    let Some((foot, first)) = fan.node(&axis, guess) else { return press };
+    let Some((straight, foot, first)) = fan.deepest(axis, guess) else { return press };
     press.gap = Some(foot);
     press.point = first.p;
     press.peak = (scale * first.sum * first.apart, first.p);
     // Square of the distance from the axis, on the plane at the foot.
     let height = foot.max(CLOSEST * thickness);
-    let farthest = radius * radius - height * height;
+    let half_angle = libm::acos((fan.straight / radius).clamp(0.0, 1.0)) + libm::acos(axis.dot(&straight).min(1.0));
+    let farthest = (height * libm::tan(half_angle.min(WIDEST))).powi(2);
     if farthest <= 0.0 {
         return press;
     }
     let normal = first.area.normalize();
-    let (e1, e2) = tangents(&axis);
+    let (e1, e2) = tangents(&straight);
     let (mut total, mut moment) = (0.0, Vec3::zeros());
     let mut forces: Vec<(Vec3, f64)> = Vec::with_capacity(MERIDIANS * NODES.len());
-    for meridian in 0..MERIDIANS {
-        let (sine, cosine) = libm::sincos(TAU * meridian as f64 / MERIDIANS as f64);
+    // What is not under the particle varies more about the axis.
+    let meridians = if axis == straight { MERIDIANS } else { 2 * MERIDIANS };
+    let axis = straight;
+    for meridian in 0..meridians {
+        let (sine, cosine) = libm::sincos(TAU * meridian as f64 / meridians as f64);
         let outwards = e1 * cosine + e2 * sine;
         let mut at = |q: f64| {
             let across = axis * height + outwards * q.sqrt();
@@ -233,7 +290,7 @@ pub fn press(
                 press.peak = (pressure, node.p);
             }
             // dω = height dq dφ / (2 length³)
-            let measure = 0.5 * (to - from) * weight * (TAU / MERIDIANS as f64) * angle * node.share;
+            let measure = 0.5 * (to - from) * weight * (TAU / meridians as f64) * angle * node.share;
             let area = node.area * measure;
             let force = area * -pressure;
             press.push += force;

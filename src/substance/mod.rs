@@ -139,15 +139,24 @@ pub struct Particle {
     pub piece: u32,
 }
 
-/// Two particles of different labels that blend as far as `weight` says.
+/// Two particles of different labels that blend a little.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bond {
     /// The particles by their places, the smaller first.
     pub pair: [u32; 2],
-    /// How much they blend, from 0 to 1.
-    pub weight: f64,
+    /// How far they are on the way to blending, from 0 to 1.
+    pub progress: f64,
     /// They are to blend, or to stop it.
     pub holds: bool,
+}
+
+impl Bond {
+    /// How much they blend, from 0 to 1. Where a neck breaks, the surface is flat in the field: it moves evenly when this
+    /// falls slowly at first (docs/model.md, "Separation and fusion").
+    pub fn weight(&self) -> f64 {
+        let left = 1.0 - self.progress;
+        1.0 - left * left * left.sqrt()
+    }
 }
 
 /// What happened to a substance in a step.
@@ -229,7 +238,7 @@ impl Substance {
         }
         let count = self.particles.len() as u32;
         let is_sound =
-            |bond: &Bond| bond.pair[0] < bond.pair[1] && bond.pair[1] < count && (0.0..=1.0).contains(&bond.weight);
+            |bond: &Bond| bond.pair[0] < bond.pair[1] && bond.pair[1] < count && (0.0..=1.0).contains(&bond.progress);
         if !self.bonds.is_sorted_by(|a, b| a.pair < b.pair) || !self.bonds.iter().all(is_sound) {
             return refuse("bonds out of order");
         }

@@ -9,7 +9,7 @@
 use super::{Bond, Change, ParticleId, Substance};
 
 /// Farthest that a bond goes in a step: the surface then moves by less than a hundredth of the thickness.
-const FASTEST: f64 = 0.05;
+const FASTEST: f64 = 0.015;
 
 /// Sets that grow together.
 #[derive(Debug, Default)]
@@ -77,9 +77,9 @@ impl Substance {
     fn move_bonds(&mut self, dt: f64) {
         let way = (dt / self.desc.blend_time).min(FASTEST);
         for bond in &mut self.bonds {
-            bond.weight = (bond.weight + if bond.holds { way } else { -way }).clamp(0.0, 1.0);
+            bond.progress = (bond.progress + if bond.holds { way } else { -way }).clamp(0.0, 1.0);
         }
-        self.bonds.retain(|bond| bond.holds || bond.weight > 0.0);
+        self.bonds.retain(|bond| bond.holds || bond.progress > 0.0);
     }
 
     fn fuse(&mut self, pressed: &[[u32; 2]]) {
@@ -90,7 +90,7 @@ impl Substance {
             match self.bond_at(*pair) {
                 Ok(at) if self.bonds[at].holds => continue,
                 Ok(at) => self.bonds[at].holds = true,
-                Err(at) => self.bonds.insert(at, Bond { pair: *pair, weight: 0.0, holds: true }),
+                Err(at) => self.bonds.insert(at, Bond { pair: *pair, progress: 0.0, holds: true }),
             }
             self.changes.push(Change::Fused(pair.map(|end| self.name_of(end))));
         }
@@ -152,7 +152,7 @@ impl Substance {
                     && self.label_of(other) != self.label_of(place)
                     && let Err(at) = self.bond_at(pair)
                 {
-                    self.bonds.insert(at, Bond { pair, weight: 1.0, holds: false });
+                    self.bonds.insert(at, Bond { pair, progress: 1.0, holds: false });
                 }
             }
         }
@@ -170,14 +170,14 @@ impl Substance {
         };
         let held: std::collections::BTreeSet<[u32; 2]> = joined.iter().map(labels).collect();
         // Those that have just begun have had no time to join.
-        let lost = |bond: &Bond| bond.holds && bond.weight >= 1.0 && !held.contains(&labels(&bond.pair));
+        let lost = |bond: &Bond| bond.holds && bond.progress >= 1.0 && !held.contains(&labels(&bond.pair));
         let lost: Vec<usize> = (0..self.bonds.len()).filter(|at| lost(&self.bonds[*at])).collect();
         lost.into_iter().for_each(|at| self.bonds[at].holds = false);
     }
 
     /// Labels between which every pair that could blend does so fully become one.
     fn merge(&mut self, reaching: &impl Fn(u32) -> Vec<u32>) {
-        let full = |bond: &Bond| bond.holds && bond.weight >= 1.0;
+        let full = |bond: &Bond| bond.holds && bond.progress >= 1.0;
         let mut ready: std::collections::BTreeMap<[u32; 2], bool> = std::collections::BTreeMap::new();
         for bond in &self.bonds {
             let [a, b] = bond.pair.map(|end| self.label_of(end));

@@ -681,8 +681,9 @@ impl Load {
     }
 
     fn is_stale(&self, swarm: &Swarm, motions: &[Motion]) -> bool {
+        let way = self.shift(swarm, motions).norm_squared();
         // Not a number before the first time.
-        !(self.shift(swarm, motions).norm_squared() <= self.patience * self.patience)
+        way.is_nan() || way > self.patience * self.patience
     }
 
     /// The push now; its stiffness is bounded by what a sub-step can follow, `most` over the mass.

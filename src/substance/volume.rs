@@ -68,6 +68,13 @@ pub fn measure(swarm: &Swarm, index: usize, directions: &[Vec3], locale: &mut Lo
         }
     }
     rivals.sort_unstable_by(|a, b| a.shortest.total_cmp(&b.shortest).then(a.index.cmp(&b.index)));
+    // The neck of two may be thinner than what rays see.
+    for other in &rivals {
+        let reach = (other.first / (2.0 * other.shortest + 2.0 * other.excess)).max(0.0);
+        if other.first <= 0.0 || 2.0 * matter.profile.value_slope(reach - own_offset).0 >= isovalue {
+            share.join(other.index);
+        }
+    }
     let solid_angle = 4.0 * PI / directions.len() as f64;
     for u in directions {
         let (mut near, mut rival) = (farthest, None);

@@ -95,7 +95,7 @@ structs! {
     Particle { id, position, velocity, force, offset, target, volume, label, piece }
     ParticleId { name }
     ParticleSlot { generation, place }
-    Bond { pair, weight, holds }
+    Bond { pair, progress, holds }
     // The profile and the reach follow from the descriptors; the rays are made at their first use.
     Skeleton { desc, link, enabled, offset, target; profile: NO_PROFILE, reach: 0.0, rays: Default::default() }
     Spring { desc }

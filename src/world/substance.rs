@@ -19,6 +19,9 @@ pub use crate::substance::{Change, Particle, ParticleId, SubstanceDesc};
 use crate::substance::{MOST_PARTICLES, Substance, fill};
 use crate::team::Team;
 
+/// Looks at the volumes in one step, when a piece is farther off than this: squeezed within a step, it swells in the same.
+const LOOKS: usize = 3;
+const TOO_FAR: f64 = 0.01;
 /// Particles that a worker measures at a time.
 const MEASURED: usize = 32;
 
@@ -420,7 +423,7 @@ impl World {
                 swarm.label.push(first_label + particle.label);
                 swarm.kind.push(kind);
             }
-            bonds.extend(substance.bonds.iter().map(|bond| (bond.pair.map(|end| end + first), bond.weight)));
+            bonds.extend(substance.bonds.iter().map(|bond| (bond.pair.map(|end| end + first), bond.weight())));
             first_label += substance.next_label;
         }
         swarm.set_bonds(&bonds);
@@ -498,13 +501,32 @@ impl World {
         }
     }
 
+    /// Moves the offsets of particles. Whether volumes are still too far off to leave it there.
+    fn control_particles(&mut self, swarm: &mut Swarm, shares: &[Share]) -> bool {
+        let (mut first, mut worst) = (0, 0.0_f64);
+        for matter in &swarm.matters {
+            let Some(substance) = self.bodies[matter.body as usize].substance.as_deref_mut() else { continue };
+            let own = first..first + substance.particles.len();
+            let offsets = &mut swarm.offset[own.clone()];
+            worst = worst.max(substance.control_volume(&shares[own.clone()], matter.profile.thickness, offsets));
+            first = own.end;
+        }
+        worst > TOO_FAR
+    }
+
     /// Volumes, offsets, pieces, bonds; and all back to the bodies.
     fn settle_substances(&mut self, system: &mut System, dt: f64, team: &Team) {
+        let mut shares = vec![Share::default(); system.swarm.place.len()];
+        for _ in 0..LOOKS {
+            let swarm = &mut system.swarm;
+            team.each_mut(&mut shares, MEASURED, |index, share| {
+                with_locale(|locale| measure(swarm, index, &swarm.matter_of(index).directions, locale, share));
+            });
+            if !self.control_particles(swarm, &shares) {
+                break;
+            }
+        }
         let swarm = &system.swarm;
-        let mut shares = vec![Share::default(); swarm.place.len()];
-        team.each_mut(&mut shares, MEASURED, |index, share| {
-            with_locale(|locale| measure(swarm, index, &swarm.matter_of(index).directions, locale, share));
-        });
         let mut first = 0;
         for (kind, matter) in swarm.matters.iter().enumerate() {
             let Some(substance) = self.bodies[matter.body as usize].substance.as_deref_mut() else { continue };
@@ -514,8 +536,8 @@ impl World {
                 particle.position = swarm.place[index] + swarm.origin;
                 particle.velocity = swarm.velocity[index];
                 particle.force = Vec3::zeros();
+                particle.offset = swarm.offset[index];
                 particle.volume = shares[index].volume;
-                particle.target.get_or_insert(shares[index].volume);
             }
             let is_own = |index: &u32| own.contains(&(*index as usize));
             let local = |index: u32| index - first as u32;
@@ -524,7 +546,7 @@ impl World {
                 let joined = shares[index].joined.iter().filter(|other| is_own(other));
                 findings.joined.extend(joined.map(|other| [local(index as u32), local(*other)]));
             }
-            let pressed = system.pressed.iter().filter(|pair| pair.iter().all(|end| is_own(end)));
+            let pressed = system.pressed.iter().filter(|pair| pair.iter().all(is_own));
             findings.pressed.extend(pressed.map(|pair| pair.map(local)));
             let reaching = |place: u32| -> Vec<u32> {
                 let index = first + place as usize;
@@ -537,7 +559,6 @@ impl World {
                 near.map(local).collect()
             };
             substance.settle(&findings, dt, reaching);
-            substance.control_volume(&shares[own], matter.profile.thickness);
             first += count;
         }
         if system.overloaded
@@ -557,31 +578,45 @@ impl World {
             profile: profile.inflated(particle.offset),
         }));
         let labels = substance.particles.iter().map(|particle| particle.label);
-        let bonds = substance.bonds.iter().map(|bond| (bond.pair, bond.weight));
+        let bonds = substance.bonds.iter().map(|bond| (bond.pair, bond.weight()));
         coat.graph.set_pieces(labels, bonds);
     }
 }
 
 impl Substance {
-    /// Moves the offsets so that each piece keeps its volume: what buried particles lack, those on the surface make good.
-    fn control_volume(&mut self, shares: &[Share], thickness: f64) {
-        let gain = self.desc.volume_gain;
-        if gain == 0.0 {
-            return;
-        }
-        let mut sums: std::collections::BTreeMap<u32, (f64, f64)> = std::collections::BTreeMap::new();
-        for (particle, share) in self.particles.iter().zip(shares) {
-            let (lack, surface) = sums.entry(particle.label).or_default();
-            *surface += share.exposed;
+    /// The next offsets of its particles, so that each piece keeps its volume: what buried particles lack, those on the
+    /// surface make good. Gives the worst relative error of a piece.
+    fn control_volume(&mut self, shares: &[Share], thickness: f64, offsets: &mut [f64]) -> f64 {
+        let mut sums: std::collections::BTreeMap<u32, Sums> = std::collections::BTreeMap::new();
+        for (particle, share) in self.particles.iter_mut().zip(shares) {
+            let target = *particle.target.get_or_insert(share.volume);
+            let sums = sums.entry(particle.label).or_default();
+            sums.target += target;
+            sums.error += share.volume - target;
+            sums.surface += share.exposed;
             if share.exposed <= 0.0 {
-                *lack += particle.target.map_or(0.0, |target| target - share.volume);
+                sums.lack += target - share.volume;
             }
         }
-        for (particle, share) in self.particles.iter_mut().zip(shares) {
-            let (lack, surface) = sums[&particle.label];
+        let gain = self.desc.volume_gain;
+        if gain == 0.0 {
+            return 0.0;
+        }
+        for ((particle, share), offset) in self.particles.iter().zip(shares).zip(offsets) {
+            let Sums { lack, surface, .. } = sums[&particle.label];
             let missing = if surface > 0.0 { lack / surface } else { 0.0 };
             let target = particle.target.unwrap_or(share.volume);
-            particle.offset = next_offset(particle.offset, gain, share, target, missing, thickness);
+            *offset = next_offset(*offset, gain, share, target, missing, thickness);
         }
+        sums.values().map(|sums| (sums.error / sums.target).abs()).fold(0.0, f64::max)
     }
+}
+
+/// Of the particles of one label: volume that is wanted, how far they are off, what buried ones lack, and surface.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    target: f64,
+    error: f64,
+    lack: f64,
+    surface: f64,
 }
