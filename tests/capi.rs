@@ -6,7 +6,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use isocoat::capi::{body, buffer, draw, handle, link, math, motion, query, report, skeleton, spring, world};
+use isocoat::capi::{
+    body, buffer, draw, handle, link, math, motion, piece, query, report, skeleton, spring, substance, world,
+};
 
 const WARNINGS: &[&str] =
     &["-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Wconversion", "-Wsign-conversion", "-Werror", "-O1", "-g"];
@@ -174,8 +176,16 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
             implicit_rounds, implicit_splits, evaluations_by_scheme, patches_by_scheme, asleep, reserved,
         }
         report::isocoat_times {
-            struct_size, reserved, step, begin, pairs, islands, respond, contact, solve, report,
+            struct_size, reserved, step, begin, pairs, islands, respond, contact, solve, report, substances,
         }
+        substance::isocoat_substance_desc {
+            struct_size, seed_count, spacing, particle_mass, cohesion, viscosity, damping, fusion_threshold, blend_time,
+            volume_gain, thickness, radius,
+        }
+        piece::isocoat_piece {
+            mass, volume, center, momentum, angular_momentum, particle_count, reserved,
+        }
+        piece::isocoat_change { kind, reserved, body, particle_count, first_particle }
         query::isocoat_ray_hit { body, link, skeleton, distance, position, normal }
         query::isocoat_surface_point { position, normal, distance, link, skeleton }
         draw::isocoat_debug_draw { struct_size, flags, context, draw_line, draw_point }

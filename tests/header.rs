@@ -28,6 +28,9 @@ const SECTIONS: &[(&str, &str)] = &[
     ("snapshot", "Snapshots"),
     ("query", "Queries"),
     ("volume", "Volumes"),
+    ("substance", "Substances"),
+    ("particle", ""),
+    ("piece", ""),
     ("draw", "Debug drawing"),
 ];
 

@@ -83,7 +83,8 @@ static int picture_write(const isocoat_world *world, const picture_view *view, u
                 failed |= isocoat_world_cast_ray(world, start, lamp, INFINITY, mask, &between, &shaded) != ISOCOAT_OK;
                 const double light = picture_dot(hit.normal, lamp);
                 const double shade = 0.35 + (shaded || light < 0.0 ? 0.0 : 0.6 * light);
-                picture_colour(hit.skeleton.index, colour);
+                /* What has no skeletons has a colour as a body. */
+                picture_colour(hit.skeleton.generation ? hit.skeleton.index : hit.body.index + 100u, colour);
                 for (int k = 0; k < 3; ++k) {
                     colour[k] *= shade;
                 }

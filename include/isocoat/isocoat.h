@@ -6,8 +6,9 @@
  * Generated from the comments in src/capi; do not edit. This file is the manual of the C API, for C99, C++11 and later.
  *
  * A world owns bodies; a body owns links, the moving frames that the host or the library drives; a link carries
- * skeletons, primitives whose fields add up to the body's coat. The surface of a coat is where the field has the
- * body's isovalue. Where two coats meet, contact forces arise. One step advances a world:
+ * skeletons, primitives whose fields add up to the body's coat. A substance is a body of particles instead. The surface
+ * of a coat is where the field has the body's isovalue. Where two coats meet, contact forces arise. One step advances a
+ * world:
  *
  *     host's poses -> isocoat_world_set_link_states -> isocoat_world_step -> isocoat_world_get_link_impulses -> host
  *
@@ -1729,6 +1730,8 @@ typedef struct isocoat_times {
     double solve;
     /** Handing back poses and impulses, contacts and events; falling asleep. */
     double report;
+    /** Particles of substances, and the volumes of their coats. */
+    double substances;
 } isocoat_times;
 
 /** Figures of the last step. Begin with isocoat_counters_default(). */
@@ -1774,11 +1777,14 @@ typedef struct isocoat_contact {
     isocoat_body body_a;
     /** The second body. */
     isocoat_body body_b;
-    /** The link of the first body whose field is the highest at the deepest point. */
+    /** The link of the first body whose field is the highest at the deepest point; null where that is a substance. */
     isocoat_link link_a;
     /** The same of the second. */
     isocoat_link link_b;
-    /** The skeleton of the first body whose territory holds the deepest point. */
+    /**
+     * The skeleton of the first body whose territory holds the deepest point; null on both sides where one of them is
+     * a substance.
+     */
     isocoat_skeleton skeleton_a;
     /** The same of the second. */
     isocoat_skeleton skeleton_b;
@@ -1965,9 +1971,9 @@ typedef uint32_t isocoat_deformation;
 typedef struct isocoat_ray_hit {
     /** The body. */
     isocoat_body body;
-    /** The link that carries the skeleton. */
+    /** The link that carries the skeleton; null on a substance. */
     isocoat_link link;
-    /** The skeleton in whose territory the point lies. */
+    /** The skeleton in whose territory the point lies; null on a substance. */
     isocoat_skeleton skeleton;
     /** Length of the ray up to the point, in m; 0 for a ray that starts inside. */
     double distance;
@@ -1985,9 +1991,9 @@ typedef struct isocoat_surface_point {
     double normal[3];
     /** Distance of the point that was asked about, in m; negative inside the coat. */
     double distance;
-    /** The link that carries the skeleton. */
+    /** The link that carries the skeleton; null on a substance. */
     isocoat_link link;
-    /** The skeleton in whose territory the point lies. */
+    /** The skeleton in whose territory the point lies; null on a substance. */
     isocoat_skeleton skeleton;
 } isocoat_surface_point;
 
@@ -2062,7 +2068,7 @@ isocoat_status isocoat_world_collide(const isocoat_world *world,
                                      size_t *count);
 
 /**
- * The first coat that a ray meets, among enabled bodies.
+ * The first coat that a ray meets, among enabled bodies. On a substance, link and skeleton of the hit are null.
  *
  * - world: not NULL.
  * - origin: 3 doubles, in m, finite; not NULL. A ray that starts inside a coat meets it at distance 0.
@@ -2085,7 +2091,7 @@ isocoat_status isocoat_world_cast_ray(const isocoat_world *world,
 
 /**
  * isocoat_world_cast_ray() against the bodies' shapes in contact. Where the field of another body reaches, a chord
- * shorter than 1/1024 of a radius of influence may be missed.
+ * shorter than 1/1024 of a radius of influence may be missed. On a substance, link and skeleton of the hit are null.
  *
  * - world: not NULL.
  * - origin: 3 doubles, in m, finite; not NULL. A ray that starts inside a coat meets it at distance 0.
@@ -2131,13 +2137,14 @@ isocoat_status isocoat_world_overlap_sphere(const isocoat_world *world,
                                             size_t *count);
 
 /**
- * The point of a body's surface that is closest to a point of the world.
+ * The point of a body's surface that is closest to a point of the world. On a substance, link and
+ * skeleton are null.
  *
  * - world: not NULL.
  * - body: the body; it may be disabled.
  * - point: 3 doubles, in m, finite; not NULL. It may be inside.
  * - closest: receives the closest point, if there is one; not NULL.
- * - found: receives whether there is one: not for a body without enabled skeletons; not NULL.
+ * - found: receives whether there is one: not for a body without enabled skeletons or particles; not NULL.
  *
  * Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE. Threads: reads the world.
  */
@@ -2149,14 +2156,14 @@ isocoat_status isocoat_body_closest_point(const isocoat_world *world,
                                           bool *found);
 
 /**
- * isocoat_body_closest_point() of a body's shape in contact.
+ * isocoat_body_closest_point() of a body's shape in contact. On a substance, link and skeleton are null.
  *
  * - world: not NULL.
  * - body: the body; a disabled one is not deformed.
  * - point: 3 doubles, in m, finite; not NULL. It may be inside.
  * - deformation: which shape, an ISOCOAT_DEFORMATION_ value.
  * - closest: receives the closest point, if there is one; not NULL.
- * - found: receives whether there is one: not for a body without enabled skeletons; not NULL.
+ * - found: receives whether there is one: not for a body without enabled skeletons or particles; not NULL.
  *
  * Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE. Threads: reads the world.
  */
@@ -2267,6 +2274,405 @@ ISOCOAT_MUST_USE
 isocoat_status isocoat_skeleton_get_offset(const isocoat_world *world,
                                            isocoat_skeleton skeleton,
                                            double *offset);
+
+/* ---- Substances -------------------------------------------------------------------------------------------------- */
+
+/**
+ * What a substance is like: clay, dough, mud. Its particles attract and repel each other, and each carries a point of
+ * the coat; isovalue, stiffness, friction, dissipation, category and mask are those of its body. Particles of one part
+ * blend; parts that come apart collide, and fuse where they are pressed together hard enough. Begin with
+ * isocoat_substance_desc_default().
+ */
+typedef struct isocoat_substance_desc {
+    /** Size of this struct in bytes, as the host knows it. */
+    uint32_t struct_size;
+    /** Seeds of a particle, which measure volumes and find pieces, from 4 to 4096. Default 64. */
+    uint32_t seed_count;
+    /** Distance of two particles at rest, in m, from 1e-9 to 1e6. Default 0.1. */
+    double spacing;
+    /**
+     * Mass of one particle, in kg, > 0 and at most 1e30: density * spacing^3 / sqrt(2) for a lump that was filled.
+     * Default 1.
+     */
+    double particle_mass;
+    /**
+     * Strength of attraction and repulsion, in J, from 0 to 1e30: at rest, a pair has a stiffness of
+     * 4 * cohesion / spacing^2. Advice: n * particle_mass * g * spacing bears a lump n particles high. Default 1.
+     */
+    double cohesion;
+    /** Friction between particles that grows with the square of their speed, in kg/m, from 0 to 1e30. Default 0. */
+    double viscosity;
+    /** Damping of a pair at rest over the critical one, from 0 to 100. Default 0.2. */
+    double damping;
+    /**
+     * Pressure between two parts above which they fuse, in Pa, at least 0: 0 is at the first touch, infinity never.
+     * Default infinity.
+     */
+    double fusion_threshold;
+    /** How long it takes for two particles to blend, or to stop it, in s, > 0 and at most 1e9. Default 0.5. */
+    double blend_time;
+    /**
+     * Part of a volume error that is taken back in a step, from 0 to 0.5; 0 switches volume control off. Default 0.5.
+     */
+    double volume_gain;
+    /**
+     * Distance of the surface from an isolated particle, in m, from 0.4 to 2 spacings; 0 stands for half a spacing.
+     * Default 0.
+     */
+    double thickness;
+    /**
+     * Distance at which the field of a particle ends, in m, more than the thickness and at most 3 spacings; 0 stands
+     * for 1.25 spacings. Default 0.
+     */
+    double radius;
+} isocoat_substance_desc;
+
+/**
+ * Fills a descriptor with its defaults; isocoat_substance_desc_default() calls it.
+ *
+ * - desc: receives at most size bytes, its struct_size among them; not NULL.
+ * - size: sizeof(isocoat_substance_desc) as the host was compiled.
+ *
+ * Errors: INVALID_ARGUMENT. Threads: any.
+ */
+isocoat_status isocoat_substance_desc_init(isocoat_substance_desc *desc, size_t size);
+
+/**
+ * Makes a body a substance, for good: from now on it has particles in place of links. The calls below refuse every
+ * other body.
+ *
+ * - world: not NULL.
+ * - body: a deformable body without links.
+ * - desc: what it is like; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE, UNSUPPORTED (a rigid body, one with links, or one that is a
+ * substance). Threads: changes the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_body_make_substance(isocoat_world *world,
+                                           isocoat_body body,
+                                           const isocoat_substance_desc *desc);
+
+/**
+ * The descriptor of a substance.
+ *
+ * - world: not NULL.
+ * - body: a substance.
+ * - desc: receives it; not NULL, with struct_size set.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, UNSUPPORTED (no substance). Threads: reads the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_substance_get_desc(const isocoat_world *world,
+                                          isocoat_body body,
+                                          isocoat_substance_desc *desc);
+
+/**
+ * Changes what a substance is like, from the next step on. Particles stay where they are.
+ *
+ * - world: not NULL.
+ * - body: a substance.
+ * - desc: the new descriptor, whole; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE, UNSUPPORTED (no substance). Threads: changes the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_substance_set_desc(isocoat_world *world,
+                                          isocoat_body body,
+                                          const isocoat_substance_desc *desc);
+
+/**
+ * Name of a particle in its substance; 0 is none. It stays the same for the particle's life, whoever else comes and
+ * goes. The name of one that was removed gives ISOCOAT_ERROR_INVALID_HANDLE; it may come again only after 4095 others
+ * have had its slot. In another body it means nothing.
+ */
+typedef uint32_t isocoat_particle;
+
+/**
+ * Adds particles to a substance: all of them, or none if one is refused. Those of one call are a part of their own:
+ * they blend with each other, and with nobody else until they fuse.
+ *
+ * - world: not NULL.
+ * - body: a substance.
+ * - positions: 3 * count doubles, in m, finite; not NULL unless count is 0.
+ * - velocities: 3 * count doubles, in m/s, finite; NULL for particles at rest.
+ * - count: number of particles.
+ * - particles: receives count names, in the same order; NULL when they are not wanted.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE (the message says which element), UNSUPPORTED (no substance),
+ * CAPACITY (more than 1048576 particles). Threads: changes the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_substance_add_particles(isocoat_world *world,
+                                               isocoat_body body,
+                                               const double *positions,
+                                               const double *velocities,
+                                               size_t count,
+                                               isocoat_particle *particles);
+
+/**
+ * Fills a box with particles at rest, packed as densely as balls, and half a spacing within its surface. They are
+ * added as isocoat_substance_add_particles does; isocoat_substance_get_particles lists them last.
+ *
+ * - world: not NULL.
+ * - body: a substance.
+ * - low: 3 doubles, the lowest corner, in m, finite; not NULL.
+ * - high: 3 doubles, the highest corner, in m, finite, none less than that of low; not NULL.
+ * - count: receives the number of new particles; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE, UNSUPPORTED (no substance), CAPACITY (more than 1048576
+ * particles). Threads: changes the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_substance_fill_box(isocoat_world *world,
+                                          isocoat_body body,
+                                          const double low[3],
+                                          const double high[3],
+                                          size_t *count);
+
+/**
+ * isocoat_substance_fill_box() of a ball.
+ *
+ * - world: not NULL.
+ * - body: a substance.
+ * - center: 3 doubles, in m, finite; not NULL.
+ * - radius: in m, > 0.
+ * - count: receives the number of new particles; not NULL.
+ *
+ * Errors: as isocoat_substance_fill_box. Threads: changes the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_substance_fill_ball(isocoat_world *world,
+                                           isocoat_body body,
+                                           const double center[3],
+                                           double radius,
+                                           size_t *count);
+
+/**
+ * isocoat_substance_fill_box() of what a triangle mesh encloses: of the points of the packing, those that it goes
+ * round, which may lie right under its surface. Time grows with points times triangles.
+ *
+ * - world: not NULL.
+ * - body: a substance.
+ * - vertices: 3 * vertex_count doubles, in m, finite; not NULL.
+ * - vertex_count: number of vertices.
+ * - triangles: 3 * triangle_count indices of vertices, all round the same way; not NULL.
+ * - triangle_count: number of triangles, at least 1.
+ * - count: receives the number of new particles; not NULL.
+ *
+ * Errors: as isocoat_substance_fill_box; OUT_OF_RANGE for an index too large, UNSUPPORTED without triangles. Threads:
+ * changes the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_substance_fill_mesh(isocoat_world *world,
+                                           isocoat_body body,
+                                           const double *vertices,
+                                           size_t vertex_count,
+                                           const uint32_t *triangles,
+                                           size_t triangle_count,
+                                           size_t *count);
+
+/**
+ * Removes particles: all of them, or none if one is refused. The coat that is left keeps the volume that it has then.
+ *
+ * - world: not NULL.
+ * - body: a substance.
+ * - particles: count names of its particles, none twice; not NULL unless count is 0.
+ * - count: number of particles.
+ *
+ * Errors: INVALID_HANDLE (the message says which element), INVALID_ARGUMENT, UNSUPPORTED (no substance; a particle
+ * twice). Threads: changes the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_substance_remove_particles(isocoat_world *world,
+                                                  isocoat_body body,
+                                                  const isocoat_particle *particles,
+                                                  size_t count);
+
+/**
+ * How many particles a substance has.
+ *
+ * - world: not NULL.
+ * - body: a substance.
+ * - count: receives the number; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, UNSUPPORTED (no substance). Threads: reads the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_substance_get_particle_count(const isocoat_world *world,
+                                                    isocoat_body body,
+                                                    size_t *count);
+
+/**
+ * All particles of a substance, in an order that changes only when some are removed.
+ *
+ * - world: not NULL.
+ * - body: a substance.
+ * - particles: receives a name a particle; NULL if not wanted.
+ * - positions: receives 3 numbers a particle, in m; skipped if its data is NULL.
+ * - velocities: receives 3 numbers a particle, in m/s; skipped if its data is NULL.
+ * - volumes: receives the volume of the coat that is a particle's, in m^3, at the last step; 0 for one that has come
+ *   since; NULL if not wanted.
+ * - pieces: receives the index of a particle's piece in the list of isocoat_substance_get_pieces; NULL if not wanted.
+ * - labels: receives the label of a particle's part: those of one label blend. A part that comes off gets a new label;
+ *   where two parts have wholly fused, one takes the other's. NULL if not wanted.
+ * - capacity: particles that fit into each of the six. With all of them NULL only the count is asked.
+ * - count: receives the number of particles, also when they do not fit; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, UNSUPPORTED (no substance), BUFFER_TOO_SMALL. Threads: reads the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_substance_get_particles(const isocoat_world *world,
+                                               isocoat_body body,
+                                               isocoat_particle *particles,
+                                               isocoat_buffer positions,
+                                               isocoat_buffer velocities,
+                                               double *volumes,
+                                               uint32_t *pieces,
+                                               uint32_t *labels,
+                                               size_t capacity,
+                                               size_t *count);
+
+/**
+ * Puts particles elsewhere, gives them other velocities, or both: all of them, or none if one is refused. What is
+ * moved does not push what it passes.
+ *
+ * - world: not NULL.
+ * - body: a substance.
+ * - particles: count names of its particles; not NULL unless count is 0. Of one that is named twice, the last state
+ *   holds.
+ * - positions: 3 * count doubles, in m, finite; NULL to leave them.
+ * - velocities: 3 * count doubles, in m/s, finite; NULL to leave them.
+ * - count: number of particles.
+ *
+ * Errors: INVALID_HANDLE, OUT_OF_RANGE (the message says which element), INVALID_ARGUMENT, UNSUPPORTED (no substance).
+ * Threads: changes the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_substance_set_particles(isocoat_world *world,
+                                               isocoat_body body,
+                                               const isocoat_particle *particles,
+                                               const double *positions,
+                                               const double *velocities,
+                                               size_t count);
+
+/**
+ * Pulls at particles throughout the next step; forces of several calls add up. All of them are taken, or none if one
+ * is refused.
+ *
+ * - world: not NULL.
+ * - body: a substance.
+ * - particles: count names of its particles; not NULL unless count is 0.
+ * - forces: 3 * count doubles, in N, finite; not NULL unless count is 0.
+ * - count: number of particles.
+ *
+ * Errors: INVALID_HANDLE, OUT_OF_RANGE (the message says which element), INVALID_ARGUMENT, UNSUPPORTED (no substance).
+ * Threads: changes the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_substance_add_forces(isocoat_world *world,
+                                            isocoat_body body,
+                                            const isocoat_particle *particles,
+                                            const double *forces,
+                                            size_t count);
+
+/** Some of a substance that hangs together in one solid. */
+typedef struct isocoat_piece {
+    /** Mass, in kg. */
+    double mass;
+    /** Volume of its solid at the last step, in m^3. */
+    double volume;
+    /** Centre of mass, in m. */
+    double center[3];
+    /** Momentum, in N s. */
+    double momentum[3];
+    /** Angular momentum about the centre of mass, in N m s. */
+    double angular_momentum[3];
+    /** How many particles it has. */
+    uint32_t particle_count;
+    /** 0. */
+    uint32_t reserved;
+} isocoat_piece;
+
+/** What happened to a part of a substance: an ISOCOAT_CHANGE_ value. More may come. */
+typedef uint32_t isocoat_change_kind;
+
+/** These particles came off, and are a part of their own. */
+#define ISOCOAT_CHANGE_SPLIT 0u
+/** These two particles, of two parts, began to blend. Between two parts that fuse there are many of them. */
+#define ISOCOAT_CHANGE_FUSED 1u
+
+/** A change of a substance in the last step. */
+typedef struct isocoat_change {
+    /** What happened. */
+    isocoat_change_kind kind;
+    /** 0. */
+    uint32_t reserved;
+    /** The substance; it may have been destroyed since. */
+    isocoat_body body;
+    /** Its particles are so many of the row that comes with the changes; some may have been removed since. */
+    size_t particle_count;
+    /** Where in that row the first of them is. */
+    size_t first_particle;
+} isocoat_change;
+
+/**
+ * The pieces of a substance: what hung together at the last step, at the places and velocities that its particles have
+ * now. What has come since counts with the first of them.
+ *
+ * - world: not NULL.
+ * - body: a substance.
+ * - pieces: receives the pieces; NULL with capacity 0 asks for the count only.
+ * - capacity: pieces that fit.
+ * - count: receives the number of pieces, also when pieces is too small; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, UNSUPPORTED (no substance), BUFFER_TOO_SMALL. Threads: reads the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_substance_get_pieces(const isocoat_world *world,
+                                            isocoat_body body,
+                                            isocoat_piece *pieces,
+                                            size_t capacity,
+                                            size_t *count);
+
+/**
+ * The particles of one piece. For those of all pieces at once, ask isocoat_substance_get_particles for pieces.
+ *
+ * - world: not NULL.
+ * - body: a substance.
+ * - piece: index of the piece in the list of isocoat_substance_get_pieces.
+ * - particles: receives the names; NULL with capacity 0 asks for the count only.
+ * - capacity: names that fit.
+ * - count: receives the number of particles, also when particles is too small; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE, UNSUPPORTED (no substance), BUFFER_TOO_SMALL. Threads: reads
+ * the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_substance_get_piece_particles(const isocoat_world *world,
+                                                     isocoat_body body,
+                                                     size_t piece,
+                                                     isocoat_particle *particles,
+                                                     size_t capacity,
+                                                     size_t *count);
+
+/**
+ * What came off and what began to fuse in the last step, in all substances.
+ *
+ * - world: not NULL.
+ * - changes: receives a pointer to the changes (not to be freed); not NULL.
+ * - count: receives their number; not NULL.
+ * - particles: receives a pointer to the names of their particles, those of the first change first (not to be freed);
+ *   not NULL.
+ *
+ * Errors: INVALID_ARGUMENT. Threads: reads the world. Lifetime: until the next step, restore or destroy
+ * of the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_world_get_substance_changes(const isocoat_world *world,
+                                                   const isocoat_change **changes,
+                                                   size_t *count,
+                                                   const isocoat_particle **particles);
 
 /* ---- Debug drawing ----------------------------------------------------------------------------------------------- */
 
@@ -2382,6 +2788,13 @@ static inline isocoat_spring_desc isocoat_spring_desc_default(void)
     return desc;
 }
 
+static inline isocoat_substance_desc isocoat_substance_desc_default(void)
+{
+    isocoat_substance_desc desc;
+    isocoat_substance_desc_init(&desc, sizeof desc);
+    return desc;
+}
+
 static inline isocoat_counters isocoat_counters_default(void)
 {
     isocoat_counters counters;
@@ -2428,6 +2841,9 @@ ISOCOAT_MUST_USE static inline isocoat_status isocoat_check_abi(void)
         (uint32_t)sizeof(isocoat_times),
         (uint32_t)sizeof(isocoat_spring_desc),
         (uint32_t)sizeof(isocoat_spring_state),
+        (uint32_t)sizeof(isocoat_substance_desc),
+        (uint32_t)sizeof(isocoat_piece),
+        (uint32_t)sizeof(isocoat_change),
     };
     return isocoat_check_abi_of(ISOCOAT_VERSION, sizes, sizeof sizes / sizeof sizes[0]);
 }

@@ -46,6 +46,9 @@ using counters = isocoat_counters;
 using times = isocoat_times;
 using ray_hit = isocoat_ray_hit;
 using surface_point = isocoat_surface_point;
+using particle = isocoat_particle; /* a name in its substance */
+using piece = isocoat_piece;
+using change = isocoat_change;
 
 /* The status of a call that failed; what() says what was wrong, with the value and the range. */
 class error : public std::runtime_error {
@@ -158,6 +161,27 @@ struct seed_list {
     std::vector<vec3> positions;
     std::vector<vec3> normals;
     std::vector<std::uint8_t> valid; /* 1 on the surface, 0 where another territory was met */
+};
+
+/* The particles of a substance: one element each in the six. */
+struct particle_list {
+    std::vector<particle> particles;
+    std::vector<vec3> positions;
+    std::vector<vec3> velocities;
+    std::vector<double> volumes;
+    std::vector<std::uint32_t> pieces; /* places in substance::pieces() */
+    std::vector<std::uint32_t> labels; /* those of one label blend */
+};
+
+/* What came off and what began to fuse in a step: a view until the next step or restore. */
+struct change_list {
+    span<const change> changes;
+    const particle *particles = nullptr;
+
+    span<const particle> of(const change &one) const noexcept
+    {
+        return {particles + one.first_particle, one.particle_count};
+    }
 };
 
 class link;
@@ -293,7 +317,9 @@ public:
     spring_state state() const { return detail::read(spring_state{}, isocoat_spring_get_state, world_, raw_); }
 };
 
-/* One deformable or rigid object: a base of links, and a coat. */
+class substance;
+
+/* One deformable or rigid object: a base of links, or of particles, and a coat. */
 class body : public detail::noun<isocoat_body> {
 public:
     using noun::noun;
@@ -327,6 +353,9 @@ public:
             return isocoat_body_get_springs(world_, raw_, list...);
         }));
     }
+
+    /* Gives it particles in place of links, for good. */
+    substance make_substance(const isocoat_substance_desc &desc = isocoat_substance_desc_default());
 
     /* Lets exactly those skeletons blend that are of the same link, or of two links that are joined. */
     void blend_neighbours(span<const std::pair<link, link>> joints)
@@ -368,6 +397,127 @@ public:
         return found ? std::optional<surface_point>(closest) : std::nullopt;
     }
 };
+
+/* A body that is a substance: clay, dough, mud. Made by body::make_substance; of any other body its calls throw. */
+class substance : public body {
+public:
+    using body::body;
+    explicit substance(const body &made) noexcept : body(made) {}
+
+    isocoat_substance_desc substance_desc() const
+    {
+        return detail::read(isocoat_substance_desc_default(), isocoat_substance_get_desc, world_, raw_);
+    }
+    void set_substance_desc(const isocoat_substance_desc &desc)
+    {
+        check(isocoat_substance_set_desc(world_, raw_, &desc));
+    }
+
+    /* Adds particles that blend with each other: all, or none if one is refused. Without velocities they rest. */
+    std::vector<particle> add(span<const vec3> positions, span<const vec3> velocities = {})
+    {
+        same_length(positions.size(), velocities, "velocities must be as long as positions, or empty");
+        std::vector<particle> made(positions.size());
+        check(isocoat_substance_add_particles(world_, raw_, numbers(positions), numbers(velocities), positions.size(),
+                                              made.data()));
+        return made;
+    }
+    /* Fill a shape with particles at rest, and say how many it took. */
+    std::size_t fill_box(const vec3 &low, const vec3 &high)
+    {
+        return detail::read(std::size_t{0}, isocoat_substance_fill_box, world_, raw_, low.data(), high.data());
+    }
+    std::size_t fill_ball(const vec3 &center, double radius)
+    {
+        return detail::read(std::size_t{0}, isocoat_substance_fill_ball, world_, raw_, center.data(), radius);
+    }
+    std::size_t fill_mesh(span<const vec3> vertices, span<const std::array<std::uint32_t, 3>> triangles)
+    {
+        return detail::read(std::size_t{0}, isocoat_substance_fill_mesh, world_, raw_, numbers(vertices),
+                            vertices.size(), triangles.empty() ? nullptr : triangles.data()->data(), triangles.size());
+    }
+    void remove(span<const particle> particles)
+    {
+        check(isocoat_substance_remove_particles(world_, raw_, particles.data(), particles.size()));
+    }
+
+    std::size_t particle_count() const
+    {
+        return detail::read(std::size_t{0}, isocoat_substance_get_particle_count, world_, raw_);
+    }
+    /* All that can be said of its particles. */
+    particle_list particles() const
+    {
+        const std::size_t count = particle_count();
+        particle_list list;
+        list.particles.resize(count);
+        list.positions.resize(count);
+        list.velocities.resize(count);
+        list.volumes.resize(count);
+        list.pieces.resize(count);
+        list.labels.resize(count);
+        if (count > 0) {
+            get_particles(list.particles.data(), buffer(list.positions.front().data()),
+                          buffer(list.velocities.front().data()), list.volumes.data(), list.pieces.data(),
+                          list.labels.data(), count);
+        }
+        return list;
+    }
+    /* Into the host's own memory, with room for `capacity` particles in each that is wanted. */
+    std::size_t get_particles(particle *particles, isocoat_buffer positions, isocoat_buffer velocities, double *volumes,
+                              std::uint32_t *pieces, std::uint32_t *labels, std::size_t capacity) const
+    {
+        std::size_t count = 0;
+        check(isocoat_substance_get_particles(world_, raw_, particles, positions, velocities, volumes, pieces, labels,
+                                              capacity, &count));
+        return count;
+    }
+    /* Positions, velocities, or both; what is empty stays as it is. */
+    void set_particles(span<const particle> particles, span<const vec3> positions, span<const vec3> velocities = {})
+    {
+        same_length(particles.size(), positions, "positions must be as long as particles, or empty");
+        same_length(particles.size(), velocities, "velocities must be as long as particles, or empty");
+        check(isocoat_substance_set_particles(world_, raw_, particles.data(), numbers(positions), numbers(velocities),
+                                              particles.size()));
+    }
+    /* Pulls at particles throughout the next step. */
+    void add_forces(span<const particle> particles, span<const vec3> forces)
+    {
+        if (particles.size() != forces.size())
+            throw error(ISOCOAT_ERROR_INVALID_ARGUMENT, "forces must be as long as particles");
+        check(isocoat_substance_add_forces(world_, raw_, particles.data(), numbers(forces), particles.size()));
+    }
+
+    /* What hung together at the last step, and the particles of one of these. */
+    std::vector<piece> pieces() const
+    {
+        return detail::list<piece>([this](auto... list) {
+            return isocoat_substance_get_pieces(world_, raw_, list...);
+        });
+    }
+    std::vector<particle> piece_particles(std::size_t index) const
+    {
+        return detail::list<particle>([this, index](auto... list) {
+            return isocoat_substance_get_piece_particles(world_, raw_, index, list...);
+        });
+    }
+
+private:
+    static const double *numbers(span<const vec3> elements)
+    {
+        return elements.empty() ? nullptr : elements.data()->data();
+    }
+    static void same_length(std::size_t size, span<const vec3> elements, const char *message)
+    {
+        if (!elements.empty() && elements.size() != size) throw error(ISOCOAT_ERROR_INVALID_ARGUMENT, message);
+    }
+};
+
+inline substance body::make_substance(const isocoat_substance_desc &desc)
+{
+    check(isocoat_body_make_substance(world_, raw_, &desc));
+    return substance(*this);
+}
 
 inline link skeleton::parent() const
 {
@@ -474,6 +624,16 @@ public:
         std::size_t count = 0;
         check(isocoat_world_get_events(get(), &first, &count));
         return {first, count};
+    }
+    /* What came off and what began to fuse in the last step, in all substances: likewise. */
+    change_list substance_changes() const
+    {
+        const change *first = nullptr;
+        std::size_t count = 0;
+        change_list list;
+        check(isocoat_world_get_substance_changes(get(), &first, &count, &list.particles));
+        list.changes = {first, count};
+        return list;
     }
     isocoat::counters counters() const
     {

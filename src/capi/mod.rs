@@ -2,8 +2,8 @@
 //!
 //! Mechanism and nouns are apart. Mechanism: [`status`] (codes, messages), [`version`], [`guard`] (panics, locks),
 //! [`mod@pointer`] and [`descriptor`] (memory of the host), [`handle`], [`buffer`]. Nouns: [`world`], [`body`],
-//! [`link`], [`skeleton`], [`blend`], [`spring`], [`math`], and what is done with them: [`motion`], [`bulk`],
-//! [`report`], [`snapshot`], [`query`], [`draw`], [`tasks`], [`volume`].
+//! [`link`], [`skeleton`], [`blend`], [`spring`], [`substance`], [`particle`], [`piece`], [`math`], and what is done
+//! with them: [`motion`], [`bulk`], [`report`], [`snapshot`], [`query`], [`draw`], [`tasks`], [`volume`].
 //!
 //! Nothing here computes: every function checks the host's pointers, translates, calls the public Rust API, and
 //! translates back. The comments are the manual that goes into the header.
@@ -22,6 +22,8 @@ pub mod handle;
 pub mod link;
 pub mod math;
 pub mod motion;
+pub mod particle;
+pub mod piece;
 pub mod pointer;
 pub mod query;
 pub mod report;
@@ -29,6 +31,7 @@ pub mod skeleton;
 pub mod snapshot;
 pub mod spring;
 pub mod status;
+pub mod substance;
 pub mod tasks;
 pub mod version;
 pub mod volume;

@@ -132,6 +132,29 @@ fn check_count<T>(count: usize, name: &str) -> Checked<()> {
     Err(Refusal::argument(format!("the count of {name} is {count}: no memory is that large")))
 }
 
+/// A row of results, which the host may not want.
+pub(super) struct Row<T>(*mut T);
+
+impl<T> Row<T> {
+    /// # Safety
+    /// `first` is NULL, or the elements that will be put can be written there until the call returns.
+    pub unsafe fn new(first: *mut T) -> Self {
+        Self(first)
+    }
+
+    pub fn is_wanted(&self) -> bool {
+        !self.0.is_null()
+    }
+
+    /// Writes element `index`, unless the row is not wanted.
+    pub fn put(&self, index: usize, element: T) {
+        if self.is_wanted() {
+            // SAFETY: `new` was promised room for the element.
+            unsafe { self.0.add(index).write_unaligned(element) }
+        }
+    }
+}
+
 /// A buffer for a number of results that the host may ask for first.
 pub(super) struct List<T> {
     first: *mut T,

@@ -18,9 +18,9 @@ use crate::world::query::{RayHit, SurfacePoint};
 pub struct isocoat_ray_hit {
     /// The body.
     pub body: isocoat_body,
-    /// The link that carries the skeleton.
+    /// The link that carries the skeleton; null on a substance.
     pub link: isocoat_link,
-    /// The skeleton in whose territory the point lies.
+    /// The skeleton in whose territory the point lies; null on a substance.
     pub skeleton: isocoat_skeleton,
     /// Length of the ray up to the point, in m; 0 for a ray that starts inside.
     pub distance: f64,
@@ -53,9 +53,9 @@ pub struct isocoat_surface_point {
     pub normal: [f64; 3],
     /// Distance of the point that was asked about, in m; negative inside the coat.
     pub distance: f64,
-    /// The link that carries the skeleton.
+    /// The link that carries the skeleton; null on a substance.
     pub link: isocoat_link,
-    /// The skeleton in whose territory the point lies.
+    /// The skeleton in whose territory the point lies; null on a substance.
     pub skeleton: isocoat_skeleton,
 }
 
@@ -190,7 +190,7 @@ pub unsafe extern "C" fn isocoat_world_collide(
     }
 }
 
-/// The first coat that a ray meets, among enabled bodies.
+/// The first coat that a ray meets, among enabled bodies. On a substance, link and skeleton of the hit are null.
 ///
 /// - world: not NULL.
 /// - origin: 3 doubles, in m, finite; not NULL. A ray that starts inside a coat meets it at distance 0.
@@ -232,7 +232,7 @@ pub unsafe extern "C" fn isocoat_world_cast_ray(
 }
 
 /// isocoat_world_cast_ray() against the bodies' shapes in contact. Where the field of another body reaches, a chord
-/// shorter than 1/1024 of a radius of influence may be missed.
+/// shorter than 1/1024 of a radius of influence may be missed. On a substance, link and skeleton of the hit are null.
 ///
 /// - world: not NULL.
 /// - origin: 3 doubles, in m, finite; not NULL. A ray that starts inside a coat meets it at distance 0.
@@ -313,13 +313,14 @@ pub unsafe extern "C" fn isocoat_world_overlap_sphere(
     }
 }
 
-/// The point of a body's surface that is closest to a point of the world.
+/// The point of a body's surface that is closest to a point of the world. On a substance, link and
+/// skeleton are null.
 ///
 /// - world: not NULL.
 /// - body: the body; it may be disabled.
 /// - point: 3 doubles, in m, finite; not NULL. It may be inside.
 /// - closest: receives the closest point, if there is one; not NULL.
-/// - found: receives whether there is one: not for a body without enabled skeletons; not NULL.
+/// - found: receives whether there is one: not for a body without enabled skeletons or particles; not NULL.
 ///
 /// Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE. Threads: reads the world.
 ///
@@ -339,14 +340,14 @@ pub unsafe extern "C" fn isocoat_body_closest_point(
     unsafe { isocoat_body_closest_point_deformed(world, body, point, ISOCOAT_DEFORMATION_NONE, closest, found) }
 }
 
-/// isocoat_body_closest_point() of a body's shape in contact.
+/// isocoat_body_closest_point() of a body's shape in contact. On a substance, link and skeleton are null.
 ///
 /// - world: not NULL.
 /// - body: the body; a disabled one is not deformed.
 /// - point: 3 doubles, in m, finite; not NULL. It may be inside.
 /// - deformation: which shape, an ISOCOAT_DEFORMATION_ value.
 /// - closest: receives the closest point, if there is one; not NULL.
-/// - found: receives whether there is one: not for a body without enabled skeletons; not NULL.
+/// - found: receives whether there is one: not for a body without enabled skeletons or particles; not NULL.
 ///
 /// Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE. Threads: reads the world.
 ///

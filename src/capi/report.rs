@@ -7,6 +7,7 @@ use libc::size_t;
 use super::descriptor::{self, Descriptor, OutStruct};
 use super::guard::{free, isocoat_world, read};
 use super::handle::{isocoat_body, isocoat_link, isocoat_skeleton};
+use super::piece::Changes;
 use super::pointer::Out;
 use super::status::isocoat_status;
 use super::world::{isocoat_scheme, scheme_to_c};
@@ -20,11 +21,12 @@ pub struct isocoat_contact {
     pub body_a: isocoat_body,
     /// The second body.
     pub body_b: isocoat_body,
-    /// The link of the first body whose field is the highest at the deepest point.
+    /// The link of the first body whose field is the highest at the deepest point; null where that is a substance.
     pub link_a: isocoat_link,
     /// The same of the second.
     pub link_b: isocoat_link,
-    /// The skeleton of the first body whose territory holds the deepest point.
+    /// The skeleton of the first body whose territory holds the deepest point; null on both sides where one of them is
+    /// a substance.
     pub skeleton_a: isocoat_skeleton,
     /// The same of the second.
     pub skeleton_b: isocoat_skeleton,
@@ -123,6 +125,7 @@ impl From<&Event> for isocoat_event {
 pub(super) struct Views {
     contacts: Vec<isocoat_contact>,
     events: Vec<isocoat_event>,
+    changes: Changes,
     /// The revision of the contacts at rest that are at the front.
     resting: u64,
 }
@@ -136,6 +139,15 @@ impl Views {
         self.contacts.extend(world.contacts()[kept..].iter().map(isocoat_contact::from));
         self.events.clear();
         self.events.extend(world.events().iter().map(isocoat_event::from));
+        self.changes.clear();
+        for body in world.bodies() {
+            let changes = world.substance_changes(body).unwrap_or_default();
+            changes.iter().for_each(|change| self.changes.push(body, change));
+        }
+    }
+
+    pub fn changes(&self) -> &Changes {
+        &self.changes
     }
 }
 

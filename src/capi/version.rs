@@ -76,6 +76,9 @@ const LAYOUTS: &[Layout] = &[
     growable::<super::report::isocoat_times>(),
     growable::<super::spring::isocoat_spring_desc>(),
     fixed::<super::spring::isocoat_spring_state>("isocoat_spring_state"),
+    growable::<super::substance::isocoat_substance_desc>(),
+    fixed::<super::piece::isocoat_piece>("isocoat_piece"),
+    fixed::<super::piece::isocoat_change>("isocoat_change"),
 ];
 
 /// What isocoat_check_abi calls: compares a host's version and struct sizes with the library's.

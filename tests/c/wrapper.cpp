@@ -288,6 +288,56 @@ static void threads_help()
     helped.bodies()[1].wake();
 }
 
+/* Three particles in a row, of which the last is put elsewhere. */
+static void substances()
+{
+    isocoat::world world;
+    isocoat::body body = world.create_body();
+    isocoat_substance_desc desc = isocoat_substance_desc_default();
+    isocoat::substance clay = body.make_substance(desc);
+    CHECK(clay == body && isocoat::substance(world.bodies()[0]) == clay);
+    const std::vector<isocoat::vec3> row = {{0, 0, 0}, {0.1, 0, 0}, {0.2, 0, 0}};
+    const std::vector<isocoat::particle> names = clay.add(row);
+    CHECK(names.size() == 3 && clay.particle_count() == 3 && clay.add({}).empty());
+    CHECK(world.substance_changes().changes.empty());
+    world.step(0.01);
+    CHECK(clay.pieces().size() == 1 && clay.pieces()[0].particle_count == 3 && clay.pieces()[0].volume > 0.0);
+
+    clay.set_particles({&names[2], 1}, std::vector<isocoat::vec3>{{1, 0, 0}});
+    clay.set_particles({&names[2], 1}, {}, std::vector<isocoat::vec3>{{0, 1, 0}});
+    clay.add_forces({&names[2], 1}, std::vector<isocoat::vec3>{{0, 0, 100}});
+    world.step(0.01);
+    const isocoat::change_list changes = world.substance_changes();
+    CHECK(changes.changes.size() == 1 && changes.changes[0].kind == ISOCOAT_CHANGE_SPLIT);
+    CHECK(changes.of(changes.changes[0]).size() == 1 && changes.of(changes.changes[0])[0] == names[2]);
+    CHECK(clay.pieces().size() == 2 && clay.piece_particles(1) == std::vector<isocoat::particle>{names[2]});
+    const isocoat::particle_list all = clay.particles();
+    CHECK(all.particles == names && all.pieces[2] == 1 && all.labels[2] != all.labels[0] && all.volumes[2] > 0.0);
+    CHECK(std::fabs(all.velocities[2][2] - 1.0) < 1e-12 && std::fabs(all.positions[2][1] - 0.01) < 1e-12);
+
+    clay.remove({&names[2], 1});
+    try {
+        clay.set_particles({&names[2], 1}, {}, std::vector<isocoat::vec3>{{0, 1, 0}});
+        CHECK(false);
+    } catch (const isocoat::error &error) {
+        CHECK(error.status() == ISOCOAT_ERROR_INVALID_HANDLE && std::strstr(error.what(), "particles[0]") != nullptr);
+    }
+    try {
+        clay.set_particles(names, row, {&row[0], 2});
+        CHECK(false);
+    } catch (const isocoat::error &error) {
+        CHECK(error.status() == ISOCOAT_ERROR_INVALID_ARGUMENT);
+    }
+    CHECK(clay.fill_box({5, 5, 5}, {6, 6, 6}) + clay.fill_ball({9, 9, 9}, 0.5) == clay.particle_count() - 2);
+    const std::vector<isocoat::vec3> corners = {{0, 0, 9}, {1, 0, 9}, {0, 1, 9}, {0, 0, 10}};
+    const std::vector<std::array<std::uint32_t, 3>> triangles = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
+    CHECK(clay.fill_mesh(corners, triangles) > 100);
+    desc = clay.substance_desc();
+    desc.fusion_threshold = 10.0;
+    clay.set_substance_desc(desc);
+    CHECK(clay.substance_desc().fusion_threshold == 10.0);
+}
+
 static void queries()
 {
     const isocoat::world world = falling_world();
@@ -343,6 +393,7 @@ int main()
     motion();
     snapshots();
     threads_help();
+    substances();
     queries();
     if (failures == 0) std::puts("wrapper: all checks hold");
     return failures == 0 ? 0 : 1;
