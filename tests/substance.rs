@@ -563,3 +563,116 @@ fn a_loaf_falls_on_a_wedge_splits_and_its_halves_stay_apart() {
     assert!(split.is_some());
     assert!(worst[0] < 0.03);
 }
+
+/// A rigid body of one link that the host moves, with a box for a skeleton.
+fn tool(world: &mut World, center: Vec3, half: Vec3, thickness: f64, friction: f64) -> LinkId {
+    let body = world
+        .create_body(BodyDesc { rigid: true, friction, static_friction: friction, ..BodyDesc::default() })
+        .unwrap();
+    let mut desc = LinkDesc { kind: Kind::Host, ..LinkDesc::default() };
+    desc.pose.position = center;
+    let link = world.create_link(body, desc).unwrap();
+    let shape = Shape::Box { center: Vec3::zeros(), half, axes: isocoat::math::Mat3::identity() };
+    world.create_skeleton(link, SkeletonDesc { shape, thickness, ..SkeletonDesc::default() }).unwrap();
+    link
+}
+
+#[test]
+fn nine_particles_are_grabbed_by_pliers_and_released() {
+    // [95, Fig. 5]: threshold zero, so that what touches is one again at once.
+    let mut world = world(G);
+    ground(&mut world);
+    let soft = SubstanceDesc { fusion_threshold: 0.0, ..clay(0.1) };
+    let body = world
+        .create_body(BodyDesc { stiffness_scale: 2e4, friction: 0.8, static_friction: 1.0, ..BodyDesc::default() })
+        .unwrap();
+    world.make_substance(body, soft).unwrap();
+    let row = |j: i32, i: i32| [0.1 * f64::from(i), 0.1 * f64::from(j), 0.06];
+    let places: Vec<[f64; 3]> = (-1..2).flat_map(|j| (-1..2).map(move |i| row(j, i))).collect();
+    world.add_particles(body, &places, None).unwrap();
+    let jaws = [-1.0, 1.0].map(|side| {
+        let half = Vec3::new(0.02, 0.06, 0.05);
+        tool(&mut world, Vec3::new(side * 0.3, 0.0, 0.09), half, 0.01, 1.0)
+    });
+    let (mut worst, mut highest): (f64, f64) = (0.0, 0.0);
+    for step in 0..300 {
+        let t = step as f64 / 60.0;
+        for (jaw, side) in jaws.into_iter().zip([-1.0, 1.0]) {
+            let closing = if t < 1.0 {
+                -0.15 * side
+            } else if (3.0..4.0).contains(&t) {
+                0.15 * side
+            } else {
+                0.0
+            };
+            let lifting = if (1.0..2.0).contains(&t) { 0.25 } else { 0.0 };
+            drive(&mut world, jaw, Vec3::new(closing, 0.0, lifting));
+        }
+        world.step(1.0 / 60.0).unwrap();
+        assert_sound(&world, body, "pliers");
+        worst = worst.max(volume_errors(&world, body)[0].abs());
+        let center = places_mean(&world, body);
+        if (2.5..3.0).contains(&t) {
+            highest = f64::max(highest, center.z);
+        }
+        if step % 30 == 29 {
+            let pieces: Vec<usize> = world.pieces(body).unwrap().iter().map(|piece| piece.particles.len()).collect();
+            println!(
+                "t {t:.1}: centre {:.3}, pieces {pieces:?}, volume {:+.4}",
+                center.z,
+                volume_errors(&world, body)[0]
+            );
+        }
+    }
+    println!("held at {highest:.3} m; volume off by {worst:.4} at most");
+    assert!(highest > 0.2, "the pliers hold it: {highest}");
+    assert!(places_mean(&world, body).z < 0.15, "and let it go");
+    assert!(worst < 0.03);
+}
+
+fn places_mean(world: &World, body: BodyId) -> Vec3 {
+    let places = places(world, body);
+    places.iter().sum::<Vec3>() / places.len() as f64
+}
+
+#[test]
+fn three_substances_under_pin_and_knife_never_mix() {
+    let mut world = world(G);
+    ground(&mut world);
+    let bodies = [(-0.3, 1.0), (0.0, 0.5), (0.3, 2.0)].map(|(x, stiffer)| {
+        let soft = clay(0.05);
+        let cohesion = soft.cohesion * stiffer;
+        let soft = SubstanceDesc { cohesion, fusion_threshold: 0.0, ..soft };
+        lump(&mut world, soft, &ball(Vec3::new(x, 0.0, 0.14), 0.14))
+    });
+    let pin_body = world.create_body(BodyDesc { rigid: true, friction: 0.5, ..BodyDesc::default() }).unwrap();
+    let mut desc = LinkDesc { kind: Kind::Host, ..LinkDesc::default() };
+    desc.pose.position = Vec3::new(-0.7, 0.0, 0.22);
+    let pin = world.create_link(pin_body, desc).unwrap();
+    let shape = Shape::Segment(Vec3::new(0.0, -0.4, 0.0), Vec3::new(0.0, 0.4, 0.0));
+    world.create_skeleton(pin, SkeletonDesc { shape, thickness: 0.08, ..SkeletonDesc::default() }).unwrap();
+    let knife = tool(&mut world, Vec3::new(0.3, 0.0, 0.5), Vec3::new(0.002, 0.3, 0.15), 0.004, 0.05);
+    let mut worst = [0.0_f64; 3];
+    for step in 0..240 {
+        let t = step as f64 / 60.0;
+        let rolling = if t < 2.0 { Vec3::new(0.35, 0.0, 0.0) } else { Vec3::new(0.0, 0.0, 0.3) };
+        let cutting = if (2.0..3.3).contains(&t) { Vec3::new(0.0, 0.0, -0.25) } else { Vec3::zeros() };
+        drive(&mut world, pin, rolling);
+        drive(&mut world, knife, cutting);
+        world.step(1.0 / 60.0).unwrap();
+        for (body, worst) in bodies.into_iter().zip(&mut worst) {
+            assert_sound(&world, body, "kitchen");
+            *worst = worst.max(volume_errors(&world, body)[0].abs());
+        }
+    }
+    for body in bodies {
+        let places = places(&world, body);
+        let low = places.iter().fold(Vec3::repeat(9.0), |low, p| low.inf(p));
+        let high = places.iter().fold(Vec3::repeat(-9.0), |high, p| high.sup(p));
+        let pieces: Vec<usize> = world.pieces(body).unwrap().iter().map(|piece| piece.particles.len()).collect();
+        println!("from {low:.2?} to {high:.2?}, pieces {pieces:?}");
+    }
+    println!("volumes off by {worst:.4?} at most");
+    assert!(worst.iter().all(|worst| *worst < 0.03));
+    assert!(world.pieces(bodies[2]).unwrap().len() > 1, "the knife cuts");
+}

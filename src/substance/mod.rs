@@ -232,8 +232,7 @@ impl Substance {
         }
         let used = self.slots.iter().filter(|slot| slot.place.is_some()).count();
         let free = self.free.iter().filter(|slot| self.slots.get(**slot as usize).is_some_and(|s| s.place.is_none()));
-        if used != self.particles.len() || free.count() != self.free.len() || used + self.free.len() != self.slots.len()
-        {
+        if used != self.particles.len() || free.count() != self.free.len() || self.slots.len() > MOST_PARTICLES {
             return refuse("names of particles that are not there");
         }
         let count = self.particles.len() as u32;
@@ -251,8 +250,13 @@ impl Substance {
         slot.place.filter(|_| slot.generation == id.name >> SLOT_BITS).map(|place| place as usize)
     }
 
-    /// Adds a particle with this label.
-    pub(crate) fn add(&mut self, position: Vec3, velocity: Vec3, label: u32) -> ParticleId {
+    /// How many more particles it can have.
+    pub(crate) fn room(&self) -> usize {
+        MOST_PARTICLES - self.slots.len() + self.free.len()
+    }
+
+    /// Adds a particle with this label, in this piece.
+    pub(crate) fn add(&mut self, position: Vec3, velocity: Vec3, label: u32, piece: u32) -> ParticleId {
         let place = Some(self.particles.len() as u32);
         let slot = match self.free.pop() {
             Some(slot) => {
@@ -275,7 +279,7 @@ impl Substance {
             target: None,
             volume: 0.0,
             label,
-            piece: 0,
+            piece,
         });
         id
     }
@@ -286,9 +290,13 @@ impl Substance {
         let gone = self.particles.swap_remove(place);
         let slot = gone.id.name & (MOST_PARTICLES as u32 - 1);
         let generation = &mut self.slots[slot as usize].generation;
-        *generation = if *generation == (1 << (32 - SLOT_BITS)) - 1 { 1 } else { *generation + 1 };
+        *generation += 1;
+        // No name is ever given twice: a slot without names left retires.
+        let has_names = *generation < 1 << (32 - SLOT_BITS);
         self.slots[slot as usize].place = None;
-        self.free.push(slot);
+        if has_names {
+            self.free.push(slot);
+        }
         if let Some(moved) = self.particles.get(place) {
             self.slots[(moved.id.name & (MOST_PARTICLES as u32 - 1)) as usize].place = Some(place as u32);
         }

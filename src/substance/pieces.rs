@@ -69,6 +69,7 @@ impl Substance {
         self.changes.clear();
         self.move_bonds(dt);
         self.fuse(&findings.pressed);
+        self.fill_seams(&reaching);
         self.split(&findings.joined, &reaching);
         self.let_go(&findings.joined);
         self.merge(&reaching);
@@ -93,6 +94,31 @@ impl Substance {
                 Err(at) => self.bonds.insert(at, Bond { pair: *pair, progress: 0.0, holds: true }),
             }
             self.changes.push(Change::Fused(pair.map(|end| self.name_of(end))));
+        }
+    }
+
+    /// Two between which nothing is pressed, but which both blend fully with others of the other label, are within what has
+    /// become one: they blend too.
+    fn fill_seams(&mut self, reaching: &impl Fn(u32) -> Vec<u32>) {
+        let blended: std::collections::BTreeSet<(u32, u32)> = self
+            .bonds
+            .iter()
+            .filter(|bond| bond.holds && bond.progress >= 1.0)
+            .flat_map(|bond| [(bond.pair[0], bond.pair[1]), (bond.pair[1], bond.pair[0])])
+            .map(|(own, other)| (own, self.label_of(other)))
+            .collect();
+        let mut ends: Vec<u32> = blended.iter().map(|(own, _)| *own).collect();
+        ends.dedup();
+        for own in &ends {
+            for other in reaching(*own).into_iter().filter(|other| other > own) {
+                let to = self.label_of(other);
+                let within = to != self.label_of(*own)
+                    && blended.contains(&(*own, to))
+                    && blended.contains(&(other, self.label_of(*own)));
+                if within && let Err(at) = self.bond_at([*own, other]) {
+                    self.bonds.insert(at, Bond { pair: [*own, other], progress: 0.0, holds: true });
+                }
+            }
         }
     }
 
@@ -141,6 +167,7 @@ impl Substance {
             self.particles[place as usize].label = *label;
             members.push(self.particles[place as usize].id);
         }
+        self.share_out_volume(&old);
         // What blended goes on blending for a while.
         for place in 0..count as u32 {
             if self.label_of(place) == old[place as usize] {
@@ -157,6 +184,24 @@ impl Substance {
             }
         }
         self.changes.extend(fresh.into_values().map(|(_, members)| Change::Split(members)));
+    }
+
+    /// Each part of what has come apart aims at the volume that it came off with, all of them at that of the whole.
+    fn share_out_volume(&mut self, old: &[u32]) {
+        let mut sums: std::collections::BTreeMap<u32, (f64, f64)> = std::collections::BTreeMap::new();
+        let split = self.particles.iter().zip(old).filter(|(particle, old)| particle.label != **old);
+        sums.extend(split.map(|(_, old)| (*old, (0.0, 0.0))));
+        for (particle, old) in self.particles.iter().zip(old) {
+            if let Some((target, volume)) = sums.get_mut(old) {
+                *target += particle.target.unwrap_or(particle.volume);
+                *volume += particle.volume;
+            }
+        }
+        for (particle, old) in self.particles.iter_mut().zip(old) {
+            if let Some((target, volume)) = sums.get(old).filter(|(_, volume)| *volume > 0.0) {
+                particle.target = Some(particle.volume * target / volume);
+            }
+        }
     }
 
     /// Bonds of two labels that hang together nowhere fade.

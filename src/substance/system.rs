@@ -14,7 +14,8 @@ use super::neighbours::Neighbours;
 use crate::base::Motion;
 use crate::contact::pair::Side;
 use crate::contact::press::Material;
-use crate::field::Profile;
+use crate::field::skeleton::closest_points;
+use crate::field::{Placed, Profile, Shape};
 use crate::math::{Vec3, Wrench};
 use crate::team::Team;
 
@@ -236,6 +237,23 @@ impl System {
                 );
             }
         }
+    }
+
+    /// Whether a rigid body is between two particles: a knife cuts, however thin it is.
+    pub fn is_cut(&self, a: usize, b: usize) -> bool {
+        let first = self.loads.partition_point(|load| (load.particle as usize) < a);
+        let line = Shape::Segment(self.swarm.place[a], self.swarm.place[b]);
+        self.loads[first..].iter().take_while(|load| load.particle as usize == a).any(|load| {
+            let Other::Obstacle { number, skeletons } = &load.other else { return false };
+            let side = &self.obstacles[*number as usize].side;
+            let near = &self.near_skeletons[skeletons.0 as usize..skeletons.1 as usize];
+            side.rigid
+                && near.iter().any(|index| {
+                    let Placed { shape, profile } = &side.skeletons[*index as usize];
+                    let (on_line, on_shape) = closest_points(&line, shape);
+                    (on_line - on_shape).norm() < profile.thickness
+                })
+        })
     }
 
     /// Moves all particles, and the links of obstacles, by `dt`.

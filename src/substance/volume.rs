@@ -16,6 +16,8 @@ use crate::math::Vec3;
 
 /// Longest way of an offset in one step, as a fraction of the thickness.
 const STRIDE: f64 = 0.1;
+/// Errors below this, as lengths over the thickness, are taken back in proportion.
+const CALM: f64 = 0.02;
 /// How near a ray's end must be, over the thickness.
 const CLOSE: f64 = 1e-4;
 /// Least area that counts as exposed, as a fraction of the area of a ball of the same volume.
@@ -212,6 +214,8 @@ pub fn next_offset(offset: f64, gain: f64, share: &Share, target: f64, missing: 
     }
     let ball = libm::cbrt(36.0 * PI * target * target);
     let error = (share.volume - target) / share.exposed.max(LEAST_AREA * ball) - missing;
+    // Near the aim, a seed more or less must not shake the coat: what is small is taken back slowly.
+    let gain = gain * (error.abs() / (CALM * thickness)).min(1.0);
     let change = (-gain * error).clamp(-STRIDE * thickness, STRIDE * thickness);
     (offset + change).clamp(OFFSETS.0 * thickness, OFFSETS.1 * thickness)
 }

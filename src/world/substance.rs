@@ -111,17 +111,18 @@ impl World {
     ) -> Result<Vec<ParticleId>> {
         let substance = self.substance(body)?;
         check_states(positions, velocities, positions.len())?;
-        if substance.particles.len() + positions.len() > MOST_PARTICLES {
+        if positions.len() > substance.room() {
             return Err(Error::Capacity("a substance has at most 1048576 particles"));
         }
         let substance = self.substance_mut(body)?;
-        let label = substance.next_label;
+        // Until a step finds out, those of one call hang together.
+        let (label, piece) = (substance.next_label, substance.particles.len() as u32);
         substance.next_label += 1;
         // Volumes are those that the coat has with the new ones.
         substance.particles.iter_mut().for_each(|particle| particle.target = None);
         let add = |(at, position): (usize, &[f64; 3])| {
             let velocity = velocities.map_or(Vec3::zeros(), |velocities| Vec3::from(velocities[at]));
-            substance.add(Vec3::from(*position), velocity, label)
+            substance.add(Vec3::from(*position), velocity, label, piece)
         };
         Ok(positions.iter().enumerate().map(add).collect())
     }
@@ -145,7 +146,8 @@ impl World {
         if size.min() < 0.0 {
             return Err(out_of_range("size of a box to fill", size.min(), "at least 0"));
         }
-        let count = size.product() * std::f64::consts::SQRT_2 / spacing.powi(3);
+        // As many as the lattice has in the box, a layer at least.
+        let count = size.map(|length| length / spacing + 1.0).product() * std::f64::consts::SQRT_2;
         if count > 4.0 * MOST_PARTICLES as f64 {
             return Err(Error::Capacity("a shape to fill would take more than 1048576 particles"));
         }
@@ -281,9 +283,9 @@ const NO_SUBSTANCE: Error = Error::Unsupported("the body is not a substance");
 
 fn check_states(positions: &[[f64; 3]], velocities: Option<&[[f64; 3]]>, count: usize) -> Result<()> {
     positions.iter().try_for_each(|p| require_finite("position or force of a particle", &Vec3::from(*p)))?;
-    let velocities = velocities.unwrap_or_default();
+    let Some(velocities) = velocities else { return Ok(()) };
     velocities.iter().try_for_each(|v| require_finite("velocity of a particle", &Vec3::from(*v)))?;
-    if !velocities.is_empty() && velocities.len() != count {
+    if velocities.len() != count {
         return Err(Error::Unsupported("velocities must be as many as particles"));
     }
     Ok(())
@@ -350,6 +352,11 @@ impl World {
     pub(super) fn step_substances(&mut self, state: &mut Stepping, dt: f64, team: &Team) {
         state.substance_contacts.clear();
         state.system.substeps = 0;
+        for slot in 0..self.bodies.capacity() {
+            if let Some(Body { substance: Some(substance), .. }) = self.bodies.at_mut(slot) {
+                substance.changes.clear();
+            }
+        }
         if self.substances().next().is_none() {
             return;
         }
@@ -554,7 +561,8 @@ impl World {
             let local = |index: u32| index - first as u32;
             let mut findings = Findings::default();
             for index in own.clone() {
-                let joined = shares[index].joined.iter().filter(|other| is_own(other));
+                let joined = shares[index].joined.iter();
+                let joined = joined.filter(|other| is_own(other) && !system.is_cut(index, **other as usize));
                 findings.joined.extend(joined.map(|other| [local(index as u32), local(*other)]));
             }
             let pressed = system.pressed.iter().filter(|pair| pair.iter().all(is_own));

@@ -167,10 +167,13 @@ impl World {
         Ok(index.and_then(|index| self.share(&posed, index, &mut Vec::new())).map_or(0.0, |share| share.volume))
     }
 
-    /// The volume of a body's solid now \[m³\]: that of all territories of its enabled skeletons. Also without volume
+    /// The volume of a body's solid now \[m³\]: that of all territories of its enabled skeletons, or, of a substance, of
+    /// its particles after the last step. Also without volume
     /// control; refused for a body with a plane, which has no bounds.
     pub fn body_volume(&self, id: BodyId) -> Result<f64> {
-        self.bodies.get(id)?;
+        if let Some(substance) = &self.bodies.get(id)?.substance {
+            return Ok(substance.particles.iter().map(|particle| particle.volume).sum());
+        }
         let (posed, mut around) = (self.own_coat(id.index()), Vec::new());
         let volumes = (0..posed.skeletons.len()).map(|index| self.share(&posed, index, &mut around));
         volumes.map(|share| share.map(|share| share.volume)).sum::<Option<f64>>().ok_or(NO_BOUNDS)
