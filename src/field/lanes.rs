@@ -46,6 +46,69 @@ pub fn evaluate(
     Dispatch::best().evaluate(skeletons, points, values, gradients);
 }
 
+/// [`evaluate`] of some of the skeletons, by their positions, summed in this order.
+///
+/// # Panics
+///
+/// When `values` or `gradients` is not as long as `points`, or a position is none.
+pub fn evaluate_some(
+    skeletons: &[Placed],
+    some: &[u32],
+    points: &[[f64; 3]],
+    values: Option<&mut [f64]>,
+    gradients: Option<&mut [[f64; 3]]>,
+) {
+    Dispatch::best().run(Query { skeletons, some: Some(some), points, values, gradients });
+}
+
+/// Eight cubes with the frame's axes, and a smaller one in the middle of each.
+#[derive(Clone, Copy, Debug)]
+pub struct Cubes {
+    /// Their middles \[m\].
+    pub centers: [[f64; 3]; 8],
+    /// Half the edge of all of them \[m\].
+    pub half: f64,
+    /// Half the edge of the smaller ones \[m\].
+    pub inner: f64,
+}
+
+/// What fields can be in eight [`Cubes`].
+#[derive(Clone, Debug, Default)]
+pub struct Spans {
+    /// At least that much is the sum of the fields in each cube.
+    pub least: [f64; 8],
+    /// At most that much.
+    pub most: [f64; 8],
+    /// At least that much is one of the fields, all over the cube.
+    pub strongest: [f64; 8],
+    /// For each skeleton, a bit for each cube that its field may reach.
+    pub reach: Vec<u8>,
+    /// The same for the smaller cubes.
+    pub reach_inner: Vec<u8>,
+}
+
+/// Bounds of the fields of some skeletons, by their positions, in eight cubes. Fields fall with distance, so bounds of
+/// the distance are bounds of the field: exact ones for points, and for other shapes those that the distance's slope of
+/// 1 gives. Rounding is not taken into account.
+///
+/// # Panics
+///
+/// When a position is none.
+pub fn spans(skeletons: &[Placed], some: &[u32], cubes: &Cubes, out: &mut Spans) {
+    out.reach.clear();
+    out.reach_inner.clear();
+    let search = Search { skeletons, some, cubes, out };
+    match Dispatch::best().0 {
+        InstructionSet::Baseline => search.run::<BASELINE_WIDTH>(),
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: `best` makes this variant only when the processor has AVX2.
+        InstructionSet::Avx2 => unsafe { spans_avx2(search) },
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: as above, with AVX-512F.
+        InstructionSet::Avx512 => unsafe { spans_avx512(search) },
+    }
+}
+
 /// An instruction set that this processor has: a value of this type is the proof that it does.
 ///
 /// All give the same bits. To choose one is for tests and benchmarks; [`evaluate`] takes the widest.
@@ -113,7 +176,10 @@ impl Dispatch {
         values: Option<&mut [f64]>,
         gradients: Option<&mut [[f64; 3]]>,
     ) {
-        let query = Query { skeletons, points, values, gradients };
+        self.run(Query { skeletons, some: None, points, values, gradients });
+    }
+
+    fn run(self, query: Query) {
         match self.0 {
             InstructionSet::Baseline => query.run::<BASELINE_WIDTH>(),
             #[cfg(target_arch = "x86_64")]
@@ -141,9 +207,22 @@ fn run_avx512(query: Query) {
     query.run::<8>();
 }
 
-/// The arguments of [`evaluate`].
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn spans_avx2(search: Search) {
+    search.run::<4>();
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f")]
+fn spans_avx512(search: Search) {
+    search.run::<8>();
+}
+
+/// The arguments of [`evaluate`] and [`evaluate_some`].
 struct Query<'a> {
     skeletons: &'a [Placed],
+    some: Option<&'a [u32]>,
     points: &'a [[f64; 3]],
     values: Option<&'a mut [f64]>,
     gradients: Option<&'a mut [[f64; 3]]>,
@@ -154,7 +233,8 @@ struct Query<'a> {
 impl Query<'_> {
     #[inline(always)]
     fn run<const W: usize>(self) {
-        let Query { skeletons, points, mut values, mut gradients } = self;
+        let Query { skeletons, some, points, mut values, mut gradients } = self;
+        let count = some.map_or(skeletons.len(), <[u32]>::len);
         assert!(values.as_ref().is_none_or(|v| v.len() == points.len()), "values and points differ in length");
         assert!(gradients.as_ref().is_none_or(|g| g.len() == points.len()), "gradients and points differ in length");
         let mut blocks = [Block::<W>::EMPTY; CHUNK];
@@ -164,7 +244,8 @@ impl Query<'_> {
             for (block, points) in blocks.iter_mut().zip(points.chunks(W)) {
                 block.load(points);
             }
-            for skeleton in skeletons {
+            for index in 0..count {
+                let skeleton = &skeletons[some.map_or(index, |some| some[index] as usize)];
                 if gradients.is_some() {
                     add::<W, true>(blocks, skeleton);
                 } else {
@@ -185,6 +266,92 @@ impl Query<'_> {
             }
         }
     }
+}
+
+/// The arguments of [`spans`].
+struct Search<'a> {
+    skeletons: &'a [Placed],
+    some: &'a [u32],
+    cubes: &'a Cubes,
+    out: &'a mut Spans,
+}
+
+impl Search<'_> {
+    #[inline(always)]
+    fn run<const W: usize>(self) {
+        let Search { skeletons, some, cubes, out } = self;
+        let mut blocks = [SpanBlock::<W>::EMPTY; 8];
+        let blocks = &mut blocks[..8 / W];
+        for (block, centers) in blocks.iter_mut().zip(cubes.centers.chunks_exact(W)) {
+            for (lane, center) in centers.iter().enumerate() {
+                block.center.iter_mut().zip(center).for_each(|(lanes, x)| lanes.0[lane] = *x);
+            }
+        }
+        for index in some {
+            let skeleton = &skeletons[*index as usize];
+            let (reach, inner) = match &skeleton.shape {
+                Shape::Point(a) => span_shape(blocks, &ToPoint(*a), &skeleton.profile, cubes),
+                Shape::Segment(a, b) => span_shape(blocks, &ToSegment::new(a, b), &skeleton.profile, cubes),
+                Shape::Triangle(a, b, c) => span_shape(blocks, &ToTriangle::new(a, b, c), &skeleton.profile, cubes),
+                Shape::Box { center, half, axes } => {
+                    span_shape(blocks, &ToBox::new(center, half, axes), &skeleton.profile, cubes)
+                }
+                Shape::Plane { point, normal } => {
+                    span_shape(blocks, &ToPlane { point: *point, normal: *normal }, &skeleton.profile, cubes)
+                }
+            };
+            out.reach.push(reach);
+            out.reach_inner.push(inner);
+        }
+        for (index, block) in blocks.iter().enumerate() {
+            let lanes = index * W..(index + 1) * W;
+            out.least[lanes.clone()].copy_from_slice(&block.least.0);
+            out.most[lanes.clone()].copy_from_slice(&block.most.0);
+            out.strongest[lanes].copy_from_slice(&block.strongest.0);
+        }
+    }
+}
+
+/// One register of cubes, and the bounds in them.
+#[derive(Clone, Copy)]
+#[repr(align(64))]
+struct SpanBlock<const W: usize> {
+    center: [Lanes<W>; 3],
+    least: Lanes<W>,
+    most: Lanes<W>,
+    strongest: Lanes<W>,
+}
+
+impl<const W: usize> SpanBlock<W> {
+    const EMPTY: Self = {
+        let zero = Lanes([0.0; W]);
+        Self { center: [zero; 3], least: zero, most: zero, strongest: zero }
+    };
+}
+
+/// Adds the bounds of one skeleton's field in each cube; gives a bit for each cube that it reaches, likewise for the
+/// smaller ones.
+#[inline(always)]
+fn span_shape<S: Distance, const W: usize>(
+    blocks: &mut [SpanBlock<W>],
+    shape: &S,
+    profile: &Profile,
+    cubes: &Cubes,
+) -> (u8, u8) {
+    let falloff = Falloff::new(profile, S::SOLID);
+    let (mut reach, mut inner) = (0, 0);
+    for (index, block) in blocks.iter_mut().enumerate() {
+        let [(near, far), (near_inner, _)] = [cubes.half, cubes.inner].map(|half| shape.span(block.center, half));
+        let least = falloff.value_slope(far).0;
+        block.least = block.least + least;
+        block.strongest = block.strongest.max(least);
+        block.most = block.most + falloff.value_slope(near).0;
+        for lane in 0..W {
+            reach |= u8::from(near.0[lane] < profile.radius) << (index * W + lane);
+            inner |= u8::from(near_inner.0[lane] < profile.radius) << (index * W + lane);
+        }
+    }
+    (reach, inner)
 }
 
 /// Blocks that are worked on together: enough to spread the cost of a skeleton's constants, few enough to stay in the
@@ -353,6 +520,9 @@ impl Falloff {
 /// Stands for a cap of no width \[m\]: its inverse is finite, and no length of importance is as short.
 const TINY: f64 = 1e-150;
 
+/// Half the diagonal of a cube over half its edge.
+const SQRT_3: f64 = 1.732_050_807_568_877_3;
+
 /// How far points are from a shape, and which way: the gradient of the distance is `direction / length`.
 #[derive(Clone, Copy)]
 struct Away<const W: usize> {
@@ -374,6 +544,14 @@ trait Distance {
 
     fn away<const W: usize>(&self, p: [Lanes<W>; 3]) -> Away<W>;
 
+    /// Bounds of the distance in a cube with this middle and half this edge.
+    #[inline(always)]
+    fn span<const W: usize>(&self, center: [Lanes<W>; 3], half: f64) -> (Lanes<W>, Lanes<W>) {
+        let (distance, radius) = (self.away(center).distance, Lanes::splat(half * SQRT_3));
+        let near = distance - radius;
+        (if Self::SOLID { near } else { near.max(Lanes::splat(0.0)) }, distance + radius)
+    }
+
     /// Turns a direction of the shape's frame into the frame of the points.
     #[inline(always)]
     fn to_world<const W: usize>(&self, direction: [Lanes<W>; 3]) -> [Lanes<W>; 3] {
@@ -392,6 +570,13 @@ impl Distance for ToPoint {
         let direction = sub(p, splat(&self.0));
         let distance = dot(direction, direction).sqrt();
         Away { distance, direction, length: distance }
+    }
+
+    #[inline(always)]
+    fn span<const W: usize>(&self, center: [Lanes<W>; 3], half: f64) -> (Lanes<W>, Lanes<W>) {
+        let (offset, half) = (sub(center, splat(&self.0)).map(Lanes::abs), Lanes::splat(half));
+        let (near, far) = (offset.map(|x| (x - half).max(Lanes::splat(0.0))), offset.map(|x| x + half));
+        (dot(near, near).sqrt(), dot(far, far).sqrt())
     }
 }
 
@@ -758,7 +943,7 @@ mod tests {
     /// The bits of values and gradients, with lanes of any width.
     fn bits_at_width<const W: usize>(skeletons: &[Placed], points: &[[f64; 3]]) -> Vec<u64> {
         let (mut values, mut gradients) = (vec![f64::NAN; points.len()], vec![[f64::NAN; 3]; points.len()]);
-        Query { skeletons, points, values: Some(&mut values), gradients: Some(&mut gradients) }.run::<W>();
+        Query { skeletons, some: None, points, values: Some(&mut values), gradients: Some(&mut gradients) }.run::<W>();
         bits(&values, &gradients)
     }
 
@@ -828,6 +1013,52 @@ mod tests {
                 if let Some((last, rest)) = points.split_last() {
                     let (value, gradient) = sums(dispatch, &skeletons, &[*last]);
                     prop_assert_eq!(bits(&value, &gradient), bits(&values[rest.len()..], &gradients[rest.len()..]));
+                }
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn some_skeletons_give_the_bits_of_a_list_of_them(
+            skeletons in prop::collection::vec(skeletons(), 1..6),
+            points in prop::collection::vec(vectors(1.5 * SIZE), 1..40),
+        ) {
+            let points: Vec<[f64; 3]> = points.into_iter().map(Into::into).collect();
+            let some: Vec<u32> = (0..skeletons.len() as u32).rev().step_by(2).collect();
+            let list: Vec<Placed> = some.iter().map(|index| skeletons[*index as usize]).collect();
+            let (values, gradients) = sums(Dispatch::best(), &list, &points);
+            let (mut others, mut slopes) = (values.clone(), gradients.clone());
+            others.fill(f64::NAN);
+            evaluate_some(&skeletons, &some, &points, Some(&mut others), Some(&mut slopes));
+            prop_assert_eq!(bits(&values, &gradients), bits(&others, &slopes));
+        }
+
+        #[test]
+        fn fields_keep_to_their_bounds_in_cubes(
+            skeletons in prop::collection::vec(skeletons(), 1..6), center in vectors(SIZE), half in 0.01..1.0f64,
+            places in prop::collection::vec(vectors(1.0), 10),
+        ) {
+            let all: Vec<u32> = (0..skeletons.len() as u32).collect();
+            let centers = std::array::from_fn(|k| [center.x + 0.3 * k as f64, center.y, center.z]);
+            let cubes = Cubes { centers, half, inner: 0.5 * half };
+            let mut spans = Spans::default();
+            super::spans(&skeletons, &all, &cubes, &mut spans);
+            let slack = 1e-9 * skeletons.iter().map(|k| k.profile.peak() + SIZE * k.profile.lipschitz()).sum::<f64>();
+            for k in 0..8 {
+                for place in &places {
+                    let p = Vec3::from(centers[k]) + place * half;
+                    let fields: Vec<f64> = skeletons.iter().map(|s| s.value(&p)).collect();
+                    let (sum, largest) = (fields.iter().sum::<f64>(), fields.iter().fold(0.0, |x, y| f64::max(x, *y)));
+                    prop_assert!(spans.least[k] <= sum + slack && sum <= spans.most[k] + slack);
+                    prop_assert!(spans.strongest[k] <= largest + slack);
+                    for (field, reach) in fields.iter().zip(&spans.reach) {
+                        prop_assert!(*field <= slack || reach >> k & 1 == 1);
+                    }
+                    let inner = Vec3::from(centers[k]) + place * (0.5 * half);
+                    for (skeleton, reach) in skeletons.iter().zip(&spans.reach_inner) {
+                        prop_assert!(skeleton.value(&inner) <= slack || reach >> k & 1 == 1);
+                    }
                 }
             }
         }

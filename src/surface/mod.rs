@@ -3,6 +3,7 @@
 
 pub mod closest;
 pub mod deformed;
+pub mod mesh;
 pub mod ray;
 
 use crate::math::Vec3;
