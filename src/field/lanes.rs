@@ -81,10 +81,18 @@ pub struct Spans {
     pub most: [f64; 8],
     /// At least that much is one of the fields, all over the cube.
     pub strongest: [f64; 8],
-    /// For each skeleton, a bit for each cube that its field may reach.
-    pub reach: Vec<u8>,
-    /// The same for the smaller cubes.
-    pub reach_inner: Vec<u8>,
+    /// For each skeleton, which cubes its field reaches: [`Spans::REACH`], [`Spans::INNER`] and [`Spans::ALL_OVER`] for
+    /// the first cube, one bit to the left for the next, and so on.
+    pub reach: Vec<u32>,
+}
+
+impl Spans {
+    /// The field may reach the cube.
+    pub const REACH: u32 = 1;
+    /// The field may reach the smaller cube.
+    pub const INNER: u32 = 1 << 8;
+    /// The field reaches the smaller cube all over.
+    pub const ALL_OVER: u32 = 1 << 16;
 }
 
 /// Bounds of the fields of some skeletons, by their positions, in eight cubes. Fields fall with distance, so bounds of
@@ -96,7 +104,6 @@ pub struct Spans {
 /// When a position is none.
 pub fn spans(skeletons: &[Placed], some: &[u32], cubes: &Cubes, out: &mut Spans) {
     out.reach.clear();
-    out.reach_inner.clear();
     let search = Search { skeletons, some, cubes, out };
     match Dispatch::best().0 {
         InstructionSet::Baseline => search.run::<BASELINE_WIDTH>(),
@@ -244,12 +251,14 @@ impl Query<'_> {
             for (block, points) in blocks.iter_mut().zip(points.chunks(W)) {
                 block.load(points);
             }
+            let mut falloff = Falloff::NONE;
             for index in 0..count {
                 let skeleton = &skeletons[some.map_or(index, |some| some[index] as usize)];
+                falloff.fit(&skeleton.profile, skeleton.shape.is_solid());
                 if gradients.is_some() {
-                    add::<W, true>(blocks, skeleton);
+                    add::<W, true>(blocks, skeleton, &falloff);
                 } else {
-                    add::<W, false>(blocks, skeleton);
+                    add::<W, false>(blocks, skeleton, &falloff);
                 }
             }
             if let Some(values) = &mut values {
@@ -287,21 +296,22 @@ impl Search<'_> {
                 block.center.iter_mut().zip(center).for_each(|(lanes, x)| lanes.0[lane] = *x);
             }
         }
+        let mut falloff = Falloff::NONE;
         for index in some {
             let skeleton = &skeletons[*index as usize];
-            let (reach, inner) = match &skeleton.shape {
-                Shape::Point(a) => span_shape(blocks, &ToPoint(*a), &skeleton.profile, cubes),
-                Shape::Segment(a, b) => span_shape(blocks, &ToSegment::new(a, b), &skeleton.profile, cubes),
-                Shape::Triangle(a, b, c) => span_shape(blocks, &ToTriangle::new(a, b, c), &skeleton.profile, cubes),
+            falloff.fit(&skeleton.profile, skeleton.shape.is_solid());
+            let reach = match &skeleton.shape {
+                Shape::Point(a) => span_shape(blocks, &ToPoint(*a), &falloff, cubes),
+                Shape::Segment(a, b) => span_shape(blocks, &ToSegment::new(a, b), &falloff, cubes),
+                Shape::Triangle(a, b, c) => span_shape(blocks, &ToTriangle::new(a, b, c), &falloff, cubes),
                 Shape::Box { center, half, axes } => {
-                    span_shape(blocks, &ToBox::new(center, half, axes), &skeleton.profile, cubes)
+                    span_shape(blocks, &ToBox::new(center, half, axes), &falloff, cubes)
                 }
                 Shape::Plane { point, normal } => {
-                    span_shape(blocks, &ToPlane { point: *point, normal: *normal }, &skeleton.profile, cubes)
+                    span_shape(blocks, &ToPlane { point: *point, normal: *normal }, &falloff, cubes)
                 }
             };
             out.reach.push(reach);
-            out.reach_inner.push(inner);
         }
         for (index, block) in blocks.iter().enumerate() {
             let lanes = index * W..(index + 1) * W;
@@ -329,29 +339,32 @@ impl<const W: usize> SpanBlock<W> {
     };
 }
 
-/// Adds the bounds of one skeleton's field in each cube; gives a bit for each cube that it reaches, likewise for the
-/// smaller ones.
+/// Adds the bounds of one skeleton's field in each cube, and gives what it reaches, see [`Spans::reach`].
 #[inline(always)]
 fn span_shape<S: Distance, const W: usize>(
     blocks: &mut [SpanBlock<W>],
     shape: &S,
-    profile: &Profile,
+    falloff: &Falloff,
     cubes: &Cubes,
-) -> (u8, u8) {
-    let falloff = Falloff::new(profile, S::SOLID);
-    let (mut reach, mut inner) = (0, 0);
+) -> u32 {
+    let (zero, radius) = (Lanes::splat(0.0), Lanes::splat(falloff.radius));
+    let square = radius * radius;
+    let mut reach = 0;
     for (index, block) in blocks.iter_mut().enumerate() {
-        let [(near, far), (near_inner, _)] = [cubes.half, cubes.inner].map(|half| shape.span(block.center, half));
-        let least = falloff.value_slope(far).0;
+        let (near, far) = shape.span(block.center, cubes.half);
+        let (near_inner, far_inner) = shape.square_span(block.center, cubes.inner);
+        let least = falloff.value_slope(far, S::SOLID).0;
         block.least = block.least + least;
         block.strongest = block.strongest.max(least);
-        block.most = block.most + falloff.value_slope(near).0;
-        for lane in 0..W {
-            reach |= u8::from(near.0[lane] < profile.radius) << (index * W + lane);
-            inner |= u8::from(near_inner.0[lane] < profile.radius) << (index * W + lane);
-        }
+        block.most = block.most + falloff.value_slope(near, S::SOLID).0;
+        // Bits as numbers, which add up exactly: comparisons stay in registers.
+        let bits = |bit: u32| Lanes(std::array::from_fn(|lane| f64::from(bit << lane)));
+        let sum = radius.where_greater(near, bits(Spans::REACH), zero)
+            + square.where_greater(near_inner, bits(Spans::INNER), zero)
+            + square.where_greater(far_inner, bits(Spans::ALL_OVER), zero);
+        reach |= (sum.sum() as u32) << (index * W);
     }
-    (reach, inner)
+    reach
 }
 
 /// Blocks that are worked on together: enough to spread the cost of a skeleton's constants, few enough to stay in the
@@ -392,24 +405,22 @@ impl<const W: usize> Block<W> {
 
 /// Adds the field of one skeleton at every point.
 #[inline(always)]
-fn add<const W: usize, const GRADIENT: bool>(blocks: &mut [Block<W>], skeleton: &Placed) {
-    let profile = &skeleton.profile;
+fn add<const W: usize, const GRADIENT: bool>(blocks: &mut [Block<W>], skeleton: &Placed, falloff: &Falloff) {
     match &skeleton.shape {
-        Shape::Point(a) => add_shape::<_, W, GRADIENT>(blocks, &ToPoint(*a), profile),
-        Shape::Segment(a, b) => add_shape::<_, W, GRADIENT>(blocks, &ToSegment::new(a, b), profile),
-        Shape::Triangle(a, b, c) => add_shape::<_, W, GRADIENT>(blocks, &ToTriangle::new(a, b, c), profile),
+        Shape::Point(a) => add_shape::<_, W, GRADIENT>(blocks, &ToPoint(*a), falloff),
+        Shape::Segment(a, b) => add_shape::<_, W, GRADIENT>(blocks, &ToSegment::new(a, b), falloff),
+        Shape::Triangle(a, b, c) => add_shape::<_, W, GRADIENT>(blocks, &ToTriangle::new(a, b, c), falloff),
         Shape::Box { center, half, axes } => {
-            add_shape::<_, W, GRADIENT>(blocks, &ToBox::new(center, half, axes), profile)
+            add_shape::<_, W, GRADIENT>(blocks, &ToBox::new(center, half, axes), falloff)
         }
         Shape::Plane { point, normal } => {
-            add_shape::<_, W, GRADIENT>(blocks, &ToPlane { point: *point, normal: *normal }, profile)
+            add_shape::<_, W, GRADIENT>(blocks, &ToPlane { point: *point, normal: *normal }, falloff)
         }
     }
 }
 
 #[inline(always)]
-fn add_shape<S: Distance, const W: usize, const GRADIENT: bool>(blocks: &mut [Block<W>], shape: &S, profile: &Profile) {
-    let falloff = Falloff::new(profile, S::SOLID);
+fn add_shape<S: Distance, const W: usize, const GRADIENT: bool>(blocks: &mut [Block<W>], shape: &S, falloff: &Falloff) {
     // The fences cost nothing at run time. They keep the compiler from vectorising the loops over blocks on top of the
     // lanes, which would fill them with shuffles and halve the speed.
     if S::TWO_PASSES {
@@ -421,7 +432,7 @@ fn add_shape<S: Distance, const W: usize, const GRADIENT: bool>(blocks: &mut [Bl
     for block in blocks {
         compiler_fence(Ordering::SeqCst);
         let away = if S::TWO_PASSES { block.away } else { shape.away(block.point) };
-        let (value, slope) = falloff.value_slope(away.distance);
+        let (value, slope) = falloff.value_slope(away.distance, S::SOLID);
         block.value = block.value + value;
         if GRADIENT {
             let scale = slope * falloff.inverse_length(away.length);
@@ -437,8 +448,10 @@ fn add_shape<S: Distance, const W: usize, const GRADIENT: bool>(blocks: &mut [Bl
 /// With `u = clamp((R - d) / (R - t), 0, 1)` and the depth `x = max(t - d, 0)` the pieces of value and slope add up,
 /// because the outer piece keeps its value and slope of the surface inside, and the inner one is zero outside:
 /// `F = u² (a + b u) + x (k + bend x / 2)`, and likewise for the slope.
+#[derive(Clone, Copy)]
 struct Falloff {
-    /// Known when compiling: solid skeletons have a core and no cap.
+    /// What it was made from: bodies of many skeletons often have one profile.
+    profile: Profile,
     solid: bool,
     thickness: f64,
     radius: f64,
@@ -459,6 +472,32 @@ struct Falloff {
 }
 
 impl Falloff {
+    /// Of no profile.
+    const NONE: Self = Self {
+        profile: Profile { isovalue: 0.0, thickness: 0.0, stiffness: 0.0, stiffening: 0.0, radius: 0.0, cap: 0.0 },
+        solid: false,
+        thickness: 0.0,
+        radius: 0.0,
+        inverse_width: 0.0,
+        a: 0.0,
+        b: 0.0,
+        slope_a: 0.0,
+        slope_b: 0.0,
+        stiffness: 0.0,
+        core_stiffness: 0.0,
+        bend: 0.0,
+        half_cap: 0.0,
+        inverse_cap: 0.0,
+    };
+
+    /// Becomes that of this profile.
+    #[inline(always)]
+    fn fit(&mut self, profile: &Profile, solid: bool) {
+        if self.profile != *profile || self.solid != solid {
+            *self = Self::new(profile, solid);
+        }
+    }
+
     #[inline(always)]
     fn new(profile: &Profile, solid: bool) -> Self {
         let &Profile { isovalue, thickness, stiffness, stiffening, radius, cap } = profile;
@@ -467,6 +506,7 @@ impl Falloff {
         let (a, b) = (3.0 * isovalue - kw, kw - 2.0 * isovalue);
         let cap = if solid { 0.0 } else { cap };
         Self {
+            profile: *profile,
             solid,
             thickness,
             radius,
@@ -483,9 +523,9 @@ impl Falloff {
         }
     }
 
-    /// `F(d)` and the slope `F'(d)`; with the cap of a thin skeleton, the slope before the factor `min(d / cap, 1)`.
+    /// `F(d)` and the slope `F'(d)`, for a shape that is solid or not, which is known when compiling; with the cap of a thin skeleton, the slope before the factor `min(d / cap, 1)`.
     #[inline(always)]
-    fn value_slope<const W: usize>(&self, d: Lanes<W>) -> (Lanes<W>, Lanes<W>) {
+    fn value_slope<const W: usize>(&self, d: Lanes<W>, solid: bool) -> (Lanes<W>, Lanes<W>) {
         let s = Lanes::splat;
         let (zero, one) = (s(0.0), s(1.0));
 
@@ -493,7 +533,7 @@ impl Falloff {
         let outer = u * u * (s(self.a) + s(self.b) * u);
         let outer_slope = u * (s(self.slope_a) + s(self.slope_b) * u);
 
-        let (depth, core) = if self.solid {
+        let (depth, core) = if solid {
             // Below the surface of the core, at depth t, the field rises linearly.
             let depth = (s(self.thickness) - d).max(zero);
             let bent = depth.min(s(self.thickness));
@@ -506,7 +546,7 @@ impl Falloff {
         };
         let inner = depth * (s(self.stiffness) + s(0.5 * self.bend) * depth);
         let value = outer + inner;
-        (if self.solid { value + core } else { value }, outer_slope - s(self.bend) * depth)
+        (if solid { value + core } else { value }, outer_slope - s(self.bend) * depth)
     }
 
     /// `min(1 / length, 1 / cap)`: what turns a slope before the cap's factor, and an offset of this length, into a
@@ -552,6 +592,14 @@ trait Distance {
         (if Self::SOLID { near } else { near.max(Lanes::splat(0.0)) }, distance + radius)
     }
 
+    /// The squares of such bounds; 0 within a shape.
+    #[inline(always)]
+    fn square_span<const W: usize>(&self, center: [Lanes<W>; 3], half: f64) -> (Lanes<W>, Lanes<W>) {
+        let (near, far) = self.span(center, half);
+        let (near, far) = (near.max(Lanes::splat(0.0)), far.max(Lanes::splat(0.0)));
+        (near * near, far * far)
+    }
+
     /// Turns a direction of the shape's frame into the frame of the points.
     #[inline(always)]
     fn to_world<const W: usize>(&self, direction: [Lanes<W>; 3]) -> [Lanes<W>; 3] {
@@ -574,9 +622,15 @@ impl Distance for ToPoint {
 
     #[inline(always)]
     fn span<const W: usize>(&self, center: [Lanes<W>; 3], half: f64) -> (Lanes<W>, Lanes<W>) {
+        let (near, far) = self.square_span(center, half);
+        (near.sqrt(), far.sqrt())
+    }
+
+    #[inline(always)]
+    fn square_span<const W: usize>(&self, center: [Lanes<W>; 3], half: f64) -> (Lanes<W>, Lanes<W>) {
         let (offset, half) = (sub(center, splat(&self.0)).map(Lanes::abs), Lanes::splat(half));
         let (near, far) = (offset.map(|x| (x - half).max(Lanes::splat(0.0))), offset.map(|x| x + half));
-        (dot(near, near).sqrt(), dot(far, far).sqrt())
+        (dot(near, near), dot(far, far))
     }
 }
 
@@ -851,6 +905,19 @@ impl<const W: usize> Lanes<W> {
     fn abs(self) -> Self {
         Self(self.0.map(f64::abs))
     }
+
+    /// Of all lanes, halves first.
+    #[inline(always)]
+    fn sum(mut self) -> f64 {
+        let mut width = W;
+        while width > 1 {
+            width /= 2;
+            for lane in 0..width {
+                self.0[lane] += self.0[lane + width];
+            }
+        }
+        self.0[0]
+    }
 }
 
 macro_rules! lane_operators {
@@ -1053,11 +1120,11 @@ mod tests {
                     prop_assert!(spans.least[k] <= sum + slack && sum <= spans.most[k] + slack);
                     prop_assert!(spans.strongest[k] <= largest + slack);
                     for (field, reach) in fields.iter().zip(&spans.reach) {
-                        prop_assert!(*field <= slack || reach >> k & 1 == 1);
+                        prop_assert!(*field <= slack || reach >> k & Spans::REACH != 0);
                     }
                     let inner = Vec3::from(centers[k]) + place * (0.5 * half);
-                    for (skeleton, reach) in skeletons.iter().zip(&spans.reach_inner) {
-                        prop_assert!(skeleton.value(&inner) <= slack || reach >> k & 1 == 1);
+                    for (skeleton, reach) in skeletons.iter().zip(&spans.reach) {
+                        prop_assert!(skeleton.value(&inner) <= slack || reach >> k & Spans::INNER != 0);
                     }
                 }
             }

@@ -31,6 +31,18 @@ pub fn index([x, y, z]: [usize; 3]) -> usize {
     x % EDGE + EDGE * (y % EDGE + EDGE * (z % EDGE))
 }
 
+/// Appends the parts whose reach is as wanted. Every part is written, and the next one over it if it is not wanted: there
+/// is nothing to guess for the processor.
+fn select(out: &mut Vec<u32>, reach: &[u32], parts: &[u32], wanted: impl Fn(u32) -> bool) {
+    let mut end = out.len();
+    out.resize(end + parts.len(), 0);
+    for (part, reach) in parts.iter().zip(reach) {
+        out[end] = *part;
+        end += usize::from(wanted(*reach));
+    }
+    out.truncate(end);
+}
+
 /// The bricks of a lattice.
 #[derive(Debug, Default)]
 pub struct Bricks {
@@ -44,6 +56,9 @@ pub struct Bricks {
     /// The parts of the bricks.
     lists: Vec<u32>,
     spans: Spans,
+    /// The same for the parts of a brick, and the parts that reach all over it.
+    finer: Spans,
+    all_over: Vec<u32>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -112,6 +127,7 @@ impl Bricks {
             let code = match verdict {
                 Some(true) => INSIDE,
                 Some(false) => continue,
+                None if self.is_inside(solid, &cubes, which, parts) => INSIDE,
                 None => self.add(solid, lattice, place(which), which, parts),
             };
             let index = self.table_index(place(which)).expect("an octet is within the table");
@@ -119,16 +135,27 @@ impl Bricks {
         }
     }
 
+    /// Whether a brick is wholly inside by a closer look at its eight parts, with the fields alone that reach all of its
+    /// samples.
+    fn is_inside(&mut self, solid: &mut impl Solid, cubes: &Cubes, which: usize, parts: &[u32]) -> bool {
+        self.all_over.clear();
+        select(&mut self.all_over, &self.spans.reach, parts, |reach| reach >> which & Spans::ALL_OVER != 0);
+        let (middle, half) = (cubes.centers[which], 0.5 * cubes.half);
+        let shift = |octant: usize, k: usize| if octant >> k & 1 == 1 { half } else { -half };
+        let centers = std::array::from_fn(|octant| [0, 1, 2].map(|k| middle[k] + shift(octant, k)));
+        let octants = Cubes { centers, half, inner: half };
+        !self.all_over.is_empty()
+            && solid.look(&self.all_over, &octants, &mut self.finer).iter().all(|verdict| *verdict == Some(true))
+    }
+
     /// Samples a brick.
     fn add(&mut self, solid: &mut impl Solid, lattice: &Lattice, place: [u32; 3], which: usize, parts: &[u32]) -> u32 {
         let begin = self.lists.len();
-        let Spans { reach, reach_inner, .. } = &self.spans;
-        let has = |bits: &[u8], part: usize| bits[part] >> which & 1 == 1;
-        let reaching = (0..parts.len()).filter(|part| has(reach_inner, *part));
-        self.lists.extend(reaching.map(|part| parts[part]));
+        let reach = &self.spans.reach;
+        select(&mut self.lists, reach, parts, |reach| reach >> which & Spans::INNER != 0);
         let own = self.lists.len();
-        let beyond = (0..parts.len()).filter(|part| has(reach, *part) && !has(reach_inner, *part));
-        self.lists.extend(beyond.map(|part| parts[part]));
+        let both = Spans::REACH | Spans::INNER;
+        select(&mut self.lists, reach, parts, |reach| reach >> which & both == Spans::REACH);
 
         let corner = place.map(|at| at * EDGE as u32);
         let sample = |index: usize| [index % EDGE, index / EDGE % EDGE, index / (EDGE * EDGE)];

@@ -41,8 +41,9 @@ pub trait Solid {
     /// The smallest length that matters to the shape \[m\], such as a thickness: roots are found to a ten thousandth of it.
     fn scale(&self) -> f64;
 
-    /// Whether each cube lies wholly inside or outside, `None` where that is not sure. No parts but these reach the
-    /// cubes; which of them reach which cube goes into `spans`.
+    /// Whether each cube lies wholly inside or outside, `None` where that is not sure; which of these parts reach which
+    /// cube goes into `spans`. Only some of the parts that reach the cubes may be given: then only what is inside counts,
+    /// and must be so whatever the others are.
     fn look(&mut self, parts: &[u32], cubes: &Cubes, spans: &mut Spans) -> [Option<bool>; 8];
 
     /// The excess at points, and its gradients \[1/m\], where no parts but these reach.
