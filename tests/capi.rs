@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use isocoat::capi::{body, buffer, draw, handle, link, math, motion, query, report, skeleton, spring, world};
+use isocoat::capi::{body, buffer, draw, handle, link, math, mesh, motion, query, report, skeleton, spring, world};
 
 const WARNINGS: &[&str] =
     &["-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Wconversion", "-Wsign-conversion", "-Werror", "-O1", "-g"];
@@ -178,6 +178,8 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
         }
         query::isocoat_ray_hit { body, link, skeleton, distance, position, normal }
         query::isocoat_surface_point { position, normal, distance, link, skeleton }
+        mesh::isocoat_mesh_desc { struct_size, deformation, cell_size }
+        mesh::isocoat_mesh_view { positions, normals, triangles, valid, vertex_count, triangle_count }
         draw::isocoat_debug_draw { struct_size, flags, context, draw_line, draw_point }
     }
 }

@@ -76,6 +76,8 @@ const LAYOUTS: &[Layout] = &[
     growable::<super::report::isocoat_times>(),
     growable::<super::spring::isocoat_spring_desc>(),
     fixed::<super::spring::isocoat_spring_state>("isocoat_spring_state"),
+    growable::<super::mesh::isocoat_mesh_desc>(),
+    fixed::<super::mesh::isocoat_mesh_view>("isocoat_mesh_view"),
 ];
 
 /// What isocoat_check_abi calls: compares a host's version and struct sizes with the library's.

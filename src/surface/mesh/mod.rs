@@ -50,7 +50,7 @@ pub trait Solid {
     fn evaluate(&mut self, parts: &[u32], points: &[[f64; 3]], excess: &mut [f64], gradients: Option<&mut [[f64; 3]]>);
 }
 
-/// A mesh of triangles: indexed, closed, each edge between two triangles that run it both ways.
+/// An indexed mesh of triangles. A watertight one is closed: each edge is between two triangles that run it both ways.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
     /// The vertices, on the surface \[m\].
@@ -59,6 +59,8 @@ pub struct Mesh {
     pub normals: Vec<[f64; 3]>,
     /// Three vertices each, counterclockwise from outside.
     pub triangles: Vec<[u32; 3]>,
+    /// Of meshes of territories: which vertices lie on the coat's surface. Empty for watertight ones, of which all do.
+    pub valid: Vec<bool>,
 }
 
 impl Mesh {
@@ -67,6 +69,7 @@ impl Mesh {
         self.positions.clear();
         self.normals.clear();
         self.triangles.clear();
+        self.valid.clear();
     }
 }
 

@@ -6,7 +6,7 @@ use crate::math::Vec3;
 /// Longest step along the edge that is trusted, in cells: the normal is that of the point before it.
 const LAST_STEP: f64 = 0.05;
 /// What the bend of the field may leave of an error after the last step, over the length scale of the solid.
-const ERROR: f64 = 1e-4;
+const ERROR: f64 = 4e-5;
 /// A step, over the same, that needs no look at the bend.
 const NO_STEP: f64 = 1e-6;
 /// Nearest to an end of the edge, in cells: vertices of edges that meet there stay apart.
@@ -59,10 +59,15 @@ impl Crossing {
         self.normal = normal.map_or_else(|| self.along(), Into::into);
         let (near, other) =
             if excess >= 0.0 { (&mut self.inside, &self.outside) } else { (&mut self.outside, &self.inside) };
+        // What the field at either end says about how it bends on the way there.
+        let place = self.place;
+        let bend_to = |end: &[f64; 2]| {
+            let length = end[0] - place;
+            ((end[1] - excess - slope * length) / (length * length)).abs()
+        };
+        let bend = bend_to(near).max(bend_to(other));
         *near = [self.place, excess];
         let (far, step) = (other[0] - self.place, -excess / slope);
-        // What the field at the other end says about how it bends on the way there.
-        let bend = (other[1] - excess - slope * far) / (far * far);
         let within = step / far >= 0.0 && step / far <= 1.0;
         let error = (bend * step * step / slope).abs() * sizes.cell;
         let short =
@@ -72,7 +77,7 @@ impl Crossing {
             true if within => (self.place + step).clamp(MARGIN, 1.0 - MARGIN),
             true => self.place.clamp(MARGIN, 1.0 - MARGIN),
             false if within && round % 3 < 2 => self.place + step,
-            false if round % 3 == 0 => self.secant(),
+            false if round.is_multiple_of(3) => self.secant(),
             false => 0.5 * (self.inside[0] + self.outside[0]),
         };
         done
