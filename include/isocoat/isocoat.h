@@ -2194,8 +2194,8 @@ isocoat_status isocoat_skeleton_get_seeds(const isocoat_world *world,
 /* ---- Meshes ------------------------------------------------------------------------------------------------------ */
 
 /**
- * A mesh of triangles, with the memory that making one takes: made again and again it soon asks for no more. It belongs
- * to no world, and outlives them.
+ * A mesh of triangles, with the memory that making one takes: made again and again it soon asks for no more. It
+ * belongs to no world, and outlives them.
  */
 typedef struct isocoat_mesh isocoat_mesh;
 
@@ -2206,8 +2206,8 @@ typedef struct isocoat_mesh_desc {
     /** Which shape of the body, an ISOCOAT_DEFORMATION_ value. Default ISOCOAT_DEFORMATION_NONE. */
     isocoat_deformation deformation;
     /**
-     * Edge of the cells that the mesh is made of, in m: about the length of its triangles, > 0. What is thinner than a
-     * cell may be missed. A quarter of the thickness looks smooth; the volume is then within 3 %, at an eighth within 1 %.
+     * Edge of the cells that the mesh is made of, in m: about the length of its triangles, > 0. What is thinner than
+     * a cell may be missed. Of a ball, a quarter of the thickness gives the volume within 3.2 %, an eighth within 1 %.
      * Default 0, which must be replaced.
      */
     double cell_size;
@@ -2230,8 +2230,8 @@ typedef struct isocoat_mesh_view {
     /** 3 vertices a triangle, counterclockwise from outside. */
     const uint32_t *triangles;
     /**
-     * A byte a vertex: 1 if it lies on the coat's surface, 0 if at another territory; NULL for a watertight mesh, where
-     * all do.
+     * A byte a vertex: 1 if it lies on the coat's surface, 0 if at another territory; NULL for a watertight mesh,
+     * where all do.
      */
     const bool *valid;
     /** Number of vertices. */
@@ -2270,8 +2270,8 @@ isocoat_status isocoat_mesh_destroy(isocoat_mesh *mesh);
 
 /**
  * Makes a watertight mesh of a body's surface, in place of what the mesh was: closed, each edge between two triangles,
- * oriented outwards, with the vertices on the surface; the same input gives the same bits. It is empty for a body without
- * enabled skeletons, and asks for no memory once the mesh has held one as large (of an undeformed body).
+ * oriented outwards, with the vertices on the surface; the same input gives the same bits. It is empty for a body
+ * without enabled skeletons, and asks for no memory once the mesh has held one as large (of an undeformed body).
  *
  * - world: not NULL.
  * - body: the body; it may be disabled. None of its enabled skeletons may be a plane.
@@ -2288,9 +2288,9 @@ isocoat_status isocoat_body_make_mesh(const isocoat_world *world,
                                       isocoat_mesh *mesh);
 
 /**
- * Makes a mesh of a skeleton's territory from its seeds, valid or not, in place of what the mesh was: for display, at no
- * cost but the seeds'. The meshes of a body's skeletons together show its coat. Which vertices are joined depends only
- * on shape, thickness and number of seeds of the skeleton, so that a host may upload the triangles once.
+ * Makes a mesh of a skeleton's territory from its seeds, valid or not, in place of what the mesh was: for display, at
+ * no cost but the seeds'. The meshes of a body's skeletons together show its coat. Which vertices are joined depends
+ * only on shape, thickness and number of seeds of the skeleton, so that a host may upload the triangles once.
  *
  * - world: not NULL.
  * - skeleton: the skeleton; the mesh of a plane is empty, and that of a disabled skeleton or link.

@@ -18,8 +18,8 @@ use super::world::unknown;
 use crate::surface::mesh::Mesh;
 use crate::world::mesh::{MeshDesc, MeshWorkspace, TerritoryStyle};
 
-/// A mesh of triangles, with the memory that making one takes: made again and again it soon asks for no more. It belongs
-/// to no world, and outlives them.
+/// A mesh of triangles, with the memory that making one takes: made again and again it soon asks for no more. It
+/// belongs to no world, and outlives them.
 pub struct isocoat_mesh {
     /// A call is using it.
     busy: AtomicBool,
@@ -100,8 +100,8 @@ pub struct isocoat_mesh_view {
     pub normals: *const f64,
     /// 3 vertices a triangle, counterclockwise from outside.
     pub triangles: *const u32,
-    /// A byte a vertex: 1 if it lies on the coat's surface, 0 if at another territory; NULL for a watertight mesh, where
-    /// all do.
+    /// A byte a vertex: 1 if it lies on the coat's surface, 0 if at another territory; NULL for a watertight mesh,
+    /// where all do.
     pub valid: *const bool,
     /// Number of vertices.
     pub vertex_count: size_t,
@@ -158,8 +158,8 @@ pub unsafe extern "C" fn isocoat_mesh_destroy(mesh: *mut isocoat_mesh) -> isocoa
 }
 
 /// Makes a watertight mesh of a body's surface, in place of what the mesh was: closed, each edge between two triangles,
-/// oriented outwards, with the vertices on the surface; the same input gives the same bits. It is empty for a body without
-/// enabled skeletons, and asks for no memory once the mesh has held one as large (of an undeformed body).
+/// oriented outwards, with the vertices on the surface; the same input gives the same bits. It is empty for a body
+/// without enabled skeletons, and asks for no memory once the mesh has held one as large (of an undeformed body).
 ///
 /// - world: not NULL.
 /// - body: the body; it may be disabled. None of its enabled skeletons may be a plane.
@@ -189,9 +189,9 @@ pub unsafe extern "C" fn isocoat_body_make_mesh(
     }
 }
 
-/// Makes a mesh of a skeleton's territory from its seeds, valid or not, in place of what the mesh was: for display, at no
-/// cost but the seeds'. The meshes of a body's skeletons together show its coat. Which vertices are joined depends only
-/// on shape, thickness and number of seeds of the skeleton, so that a host may upload the triangles once.
+/// Makes a mesh of a skeleton's territory from its seeds, valid or not, in place of what the mesh was: for display, at
+/// no cost but the seeds'. The meshes of a body's skeletons together show its coat. Which vertices are joined depends
+/// only on shape, thickness and number of seeds of the skeleton, so that a host may upload the triangles once.
 ///
 /// - world: not NULL.
 /// - skeleton: the skeleton; the mesh of a plane is empty, and that of a disabled skeleton or link.

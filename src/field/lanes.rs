@@ -523,7 +523,8 @@ impl Falloff {
         }
     }
 
-    /// `F(d)` and the slope `F'(d)`, for a shape that is solid or not, which is known when compiling; with the cap of a thin skeleton, the slope before the factor `min(d / cap, 1)`.
+    /// `F(d)` and the slope `F'(d)`, for a shape that is solid or not, which is known when compiling; with the
+    /// cap of a thin skeleton, the slope before the factor `min(d / cap, 1)`.
     #[inline(always)]
     fn value_slope<const W: usize>(&self, d: Lanes<W>, solid: bool) -> (Lanes<W>, Lanes<W>) {
         let s = Lanes::splat;

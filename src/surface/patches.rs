@@ -25,7 +25,7 @@ const SHAKE: f64 = 1e-9;
 /// Corners of a scale.
 pub const CORNERS: usize = 6;
 /// How much wider a scale is than what its ray stands for.
-const OVERLAP: f64 = 1.25;
+const OVERLAP: f64 = 1.5;
 
 /// The triangles that join the rays of a bounded shape, counterclockwise from outside; a closed manifold with all rays,
 /// of which there are at least four. `rays` are in the frame of the shape.

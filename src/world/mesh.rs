@@ -90,8 +90,8 @@ impl World {
     }
 
     /// A mesh of a skeleton's territory from its [seeds](World::seeds), valid or not, in the world: for display, at no
-    /// cost but the seeds'. The meshes of a body's skeletons together show its coat: those of blending skeletons sink into
-    /// each other at the borders of their territories. Which vertices are joined depends only on shape, thickness and
+    /// cost but the seeds'. The meshes of a body's skeletons together show its coat; at the borders of territories,
+    /// patches leave gaps as wide as seeds are apart. Which vertices are joined depends only on shape, thickness and
     /// number of seeds of the skeleton. Empty for a plane, and while the skeleton or its link is disabled.
     pub fn territory_mesh(&self, skeleton: SkeletonId, style: TerritoryStyle) -> Result<Mesh> {
         let mut out = Mesh::default();

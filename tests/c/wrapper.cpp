@@ -313,7 +313,8 @@ static void queries()
     const isocoat::skeleton point = bodies[0].links()[0].skeletons()[0];
     isocoat::mesh mesh;
     bodies[0].make_mesh(mesh, 0.02);
-    CHECK(mesh.triangles().size() == 2 * mesh.positions().size() - 4 && mesh.normals().size() == mesh.view().vertex_count);
+    CHECK(mesh.triangles().size() == 2 * mesh.positions().size() - 4);
+    CHECK(mesh.normals().size() == mesh.view().vertex_count);
     bodies[0].make_mesh(mesh, 0.02, ISOCOAT_DEFORMATION_CONTACT);
     CHECK(mesh.view().vertex_count > 0 && mesh.view().valid == nullptr);
     point.make_mesh(mesh);

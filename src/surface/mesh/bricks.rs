@@ -19,8 +19,7 @@ const OUTSIDE: u32 = u32::MAX;
 const INSIDE: u32 = u32::MAX - 1;
 
 /// Half the edges of the cubes for which [`Solid::look`] is asked, in cells. What a brick answers for: its samples, the
-/// edges that begin at them, and those that end there; all these meet no surface where the cube is clear of it. Vertices
-/// on edges are within, too.
+/// edges that begin at them, and those that end there; all these meet no surface where the cube is clear of it.
 const ASKED: f64 = 0.5 * EDGE as f64 + 0.5;
 /// The same of its samples alone.
 const OWN: f64 = 0.5 * EDGE as f64 - 0.5;
@@ -31,8 +30,8 @@ pub fn index([x, y, z]: [usize; 3]) -> usize {
     x % EDGE + EDGE * (y % EDGE + EDGE * (z % EDGE))
 }
 
-/// Appends the parts whose reach is as wanted. Every part is written, and the next one over it if it is not wanted: there
-/// is nothing to guess for the processor.
+/// Appends the parts whose reach is as wanted. Every part is written, and the next one over it if it is not wanted:
+/// there is nothing to guess for the processor.
 fn select(out: &mut Vec<u32>, reach: &[u32], parts: &[u32], wanted: impl Fn(u32) -> bool) {
     let mut end = out.len();
     out.resize(end + parts.len(), 0);
@@ -135,8 +134,8 @@ impl Bricks {
         }
     }
 
-    /// Whether a brick is wholly inside by a closer look at its eight parts, with the fields alone that reach all of its
-    /// samples.
+    /// Whether a brick is wholly inside by a closer look at its eight parts, with the fields alone that reach all of
+    /// its samples.
     fn is_inside(&mut self, solid: &mut impl Solid, cubes: &Cubes, which: usize, parts: &[u32]) -> bool {
         self.all_over.clear();
         select(&mut self.all_over, &self.spans.reach, parts, |reach| reach >> which & Spans::ALL_OVER != 0);

@@ -95,7 +95,7 @@ impl Solid for Coated<'_> {
     fn look(&mut self, parts: &[u32], cubes: &Cubes, spans: &mut Spans) -> [Option<bool>; 8] {
         let coat = &self.deformed.coat;
         lanes::spans(&coat.skeletons, parts, cubes, spans);
-        // Any single field is at most what a graph makes of all, and that is at most their sum and its rounding of edges.
+        // Any single field is at most what a graph makes of all; that is at most their sum and what it rounds off.
         let least = if coat.graph.is_complete() { &spans.least } else { &spans.strongest };
         let (level, slack) = (coat.isovalue, ROUNDING * coat.isovalue);
         std::array::from_fn(|k| {

@@ -9,7 +9,7 @@
 //!    [`bricks`]: their parts, their samples, and one bit a sample;
 //! 4. each edge of the lattice whose ends differ has a vertex, in the brick of its lower end: the root of the excess on
 //!    the edge, from the same parts, many at once (`root`);
-//! 5. each cell is looked up by the bits of its corners in a [`table`] that makes closed, oriented manifolds of any bits.
+//! 5. each cell is looked up by the bits of its corners in a [`table`] that makes closed, oriented manifolds of any.
 //!
 //! The mesh is closed and manifold by construction: a sample has one bit, whoever looks, and what lies between the bits
 //! is the table's. Vertices stay on their edges, so that the mesh does not fold over. The lattice is fixed to the frame
@@ -38,12 +38,12 @@ pub trait Solid {
     /// excess is negative.
     fn bounds(&self, part: usize) -> (Vec3, Vec3);
 
-    /// The smallest length that matters to the shape \[m\], such as a thickness: roots are found to a ten thousandth of it.
+    /// The smallest length that matters to the shape \[m\], such as a thickness: roots are found to a part of it.
     fn scale(&self) -> f64;
 
     /// Whether each cube lies wholly inside or outside, `None` where that is not sure; which of these parts reach which
-    /// cube goes into `spans`. Only some of the parts that reach the cubes may be given: then only what is inside counts,
-    /// and must be so whatever the others are.
+    /// cube goes into `spans`. Only some of the parts that reach the cubes may be given: then only what is inside
+    /// counts, and must be so whatever the others are.
     fn look(&mut self, parts: &[u32], cubes: &Cubes, spans: &mut Spans) -> [Option<bool>; 8];
 
     /// The excess at points, and its gradients \[1/m\], where no parts but these reach.

@@ -2,9 +2,9 @@
 //!
 //! On each face of a cell the surface is a set of segments between the cut edges, and inside corners are kept apart
 //! from each other where both readings are possible. That depends on the four corners of the face alone, so that the
-//! two cells at a face agree, and segments close to loops round the cell. A loop is split by chords no two ends of which
-//! lie on a common face: such a chord belongs to one cell, while segments belong to two. So every edge of the mesh has
-//! two triangles, whatever the corners are, and the triangles at a cut edge form one fan.
+//! two cells at a face agree, and segments close to loops round the cell. A loop is split by chords whose ends lie on no
+//! common face: such a chord belongs to one cell, while segments belong to two. So every edge of the mesh has two
+//! triangles, whatever the corners are, and the triangles at a cut edge form one fan.
 
 use std::sync::LazyLock;
 

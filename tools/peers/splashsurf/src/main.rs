@@ -51,8 +51,8 @@ fn time(call: impl FnOnce()) -> f64 {
 }
 
 fn main() {
-    println!("particles | splashsurf ms | triangles | isocoat ms | triangles | times as fast");
-    for count in [10_000] {
+    println!("particles,splashsurf_ms,splashsurf_triangles,isocoat_ms,isocoat_triangles");
+    for count in [10_000, 80_000] {
         let particles = particles(count);
         let single: Vec<Vector3<f32>> =
             particles.iter().map(|p| Vector3::new(p.x as f32, p.y as f32, p.z as f32)).collect();
@@ -74,7 +74,6 @@ fn main() {
             }));
         }
         let triangles = surface.mesh.triangles.len();
-        let ratio = theirs / ours;
-        println!("{count} | {theirs:.1} | {triangles} | {ours:.1} | {} | {ratio:.2}", out.triangles.len());
+        println!("{count},{theirs:.2},{triangles},{ours:.2},{}", out.triangles.len());
     }
 }
