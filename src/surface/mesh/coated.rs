@@ -92,6 +92,10 @@ impl Solid for Coated<'_> {
         self.deformed.coat.skeletons.iter().map(|skeleton| skeleton.profile.thickness).fold(f64::INFINITY, f64::min)
     }
 
+    fn has_kinks(&self) -> bool {
+        !self.deformed.obstacles.is_empty() || !self.deformed.coat.graph.is_complete()
+    }
+
     fn look(&mut self, parts: &[u32], cubes: &Cubes, spans: &mut Spans) -> [Option<bool>; 8] {
         let coat = &self.deformed.coat;
         lanes::spans(&coat.skeletons, parts, cubes, spans);

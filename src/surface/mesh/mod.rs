@@ -41,6 +41,9 @@ pub trait Solid {
     /// The smallest length that matters to the shape \[m\], such as a thickness: roots are found to a part of it.
     fn scale(&self) -> f64;
 
+    /// Whether the slope of the field may jump, or nearly so: roots then take more looks.
+    fn has_kinks(&self) -> bool;
+
     /// Whether each cube lies wholly inside or outside, `None` where that is not sure; which of these parts reach which
     /// cube goes into `spans`. Only some of the parts that reach the cubes may be given: then only what is inside
     /// counts, and must be so whatever the others are.
@@ -108,7 +111,7 @@ impl Workspace {
     /// A vertex for each edge whose ends differ, on the surface.
     fn place_vertices(&mut self, solid: &mut impl Solid, lattice: &Lattice, out: &mut Mesh) {
         let count = self.bricks.len();
-        let sizes = Sizes { cell: lattice.cell, scale: solid.scale() };
+        let sizes = Sizes { cell: lattice.cell, scale: solid.scale(), kinks: solid.has_kinks() };
         if self.vertices.len() < count {
             self.vertices.resize(count, [[0; 3]; bricks::SAMPLES]);
         }

@@ -7,6 +7,8 @@ use crate::math::Vec3;
 const LAST_STEP: f64 = 0.05;
 /// What the bend of the field may leave of an error after the last step, over the length scale of the solid.
 const ERROR: f64 = 4e-5;
+/// The same where the slope may jump on the way, which is then taken for granted.
+const ERROR_AT_KINKS: f64 = 3e-4;
 /// A step, over the same, that needs no look at the bend.
 const NO_STEP: f64 = 1e-6;
 /// Nearest to an end of the edge, in cells: vertices of edges that meet there stay apart.
@@ -59,19 +61,19 @@ impl Crossing {
         self.normal = normal.map_or_else(|| self.along(), Into::into);
         let (near, other) =
             if excess >= 0.0 { (&mut self.inside, &self.outside) } else { (&mut self.outside, &self.inside) };
-        // What the field at either end says about how it bends on the way there.
-        let place = self.place;
-        let bend_to = |end: &[f64; 2]| {
+        let (place, far, step) = (self.place, other[0] - self.place, -excess / slope);
+        // What the field at either end says about how it bends, or how its slope jumps, on the way there.
+        let error_by = |end: &[f64; 2]| {
             let length = end[0] - place;
-            ((end[1] - excess - slope * length) / (length * length)).abs()
+            let change = ((end[1] - excess) / length / slope - 1.0).abs();
+            change * step.abs() * if sizes.kinks { 1.0 } else { (step / length).abs() }
         };
-        let bend = bend_to(near).max(bend_to(other));
-        *near = [self.place, excess];
-        let (far, step) = (other[0] - self.place, -excess / slope);
+        let error = error_by(near).max(error_by(other)) * sizes.cell;
+        *near = [place, excess];
         let within = step / far >= 0.0 && step / far <= 1.0;
-        let error = (bend * step * step / slope).abs() * sizes.cell;
+        let most = if sizes.kinks { ERROR_AT_KINKS } else { ERROR };
         let short =
-            step.abs() <= LAST_STEP && error <= ERROR * sizes.scale || step.abs() * sizes.cell <= NO_STEP * sizes.scale;
+            step.abs() <= LAST_STEP && error <= most * sizes.scale || step.abs() * sizes.cell <= NO_STEP * sizes.scale;
         let done = excess == 0.0 || within && short || far.abs() <= 1e-12;
         self.place = match done {
             true if within => (self.place + step).clamp(MARGIN, 1.0 - MARGIN),
@@ -98,6 +100,8 @@ pub struct Sizes {
     pub cell: f64,
     /// [`Solid::scale`].
     pub scale: f64,
+    /// [`Solid::has_kinks`].
+    pub kinks: bool,
 }
 
 /// Memory of [`Roots::find`].
