@@ -1,7 +1,7 @@
 /*
  * Meshes of soft bodies that press on each other: a limb of three skeletons lies on a ball, and a finger pushes into
  * it. The watertight meshes, and those of the territories in both styles. With a folder as argument it leaves pictures
- * there, and the watertight meshes as skin.obj. Exits 0 when every watertight mesh is closed, as Euler's formula counts.
+ * there, and the watertight meshes as skin.obj. Exits 0 when every watertight mesh is closed, by Euler's formula.
  */
 #include <isocoat/isocoat.h>
 
@@ -111,7 +111,7 @@ static int skins(const isocoat_world *world, const isocoat_body *bodies, double 
 
 int main(int count, char **arguments)
 {
-    static const picture_view view = {{-0.5, -1.4, 0.5}, {0.02, -0.05, -0.02}, {0.0, 0.0, 1.0}, 1.0};
+    static const picture_view view = {{-0.5, -1.4, 0.5}, {0.02, -0.05, -0.02}, {0.0, 0.0, 1.0}, 1.3};
     const isocoat_world_desc desc = isocoat_world_desc_default();
     isocoat_world *world = NULL;
     isocoat_mesh *mesh = NULL;
