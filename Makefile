@@ -117,7 +117,7 @@ demo-plot:
 	@mkdir -p $(OUT)
 	$(CARGO) run --release --quiet --example two_balls_plot -- $(OUT)/two_balls.svg
 
-SCENES := clover muscle jelly dough cpp/walk cpp/bullet_character
+SCENES := clover muscle jelly dough skin cpp/walk cpp/bullet_character
 
 .PHONY: scenes
 scenes: $(SCENES:%=$(WORK)/examples/%) ## characters, muscles, jelly: run each scene, with pictures in out/
@@ -236,12 +236,14 @@ $(eval $(call compile_one,tools/peers/bullet_clusters.cpp,$(PEERS)/bullet_cluste
 $(eval $(call compile_one,tools/peers/coat_spheres.cpp,$(PEERS)/coat_spheres,$$(CXX) $$(CXX_FLAGS) $$(CXXFLAGS)))
 
 .PHONY: peers
-peers: ## isocoat beside Bullet's soft bodies and Drake's hydroelastic contact, into docs/peers.md (takes minutes)
+peers: ## isocoat beside Bullet's soft bodies, Drake's hydroelastic contact and splashsurf, into docs/peers.md (takes minutes)
 	@command -v python3 >/dev/null || { echo 'python3 is missing: it runs the peers and writes the page.'; exit 1; }
 	@tools/deps.sh demo
 	@rm -f '$(PEERS)'/*
 	-@$(MAKE) $(PEERS)/bullet_clusters
 	-@$(MAKE) $(PEERS)/coat_spheres
+	-@cd tools/peers/splashsurf && $(CARGO) build --release --quiet --target-dir '$(TARGET)/peers/splashsurf' && \
+		cp '$(TARGET)/peers/splashsurf/release/mesh-particles' '$(PEERS)/'
 	-@'$(PEERS_PYTHON)' -c 'import pydrake' 2>/dev/null || { echo 'Installing: drake, with pip, under target/'; \
 		python3 -m venv '$(TARGET)/peers/venv' && '$(PEERS_PYTHON)' -m pip install --quiet drake; }
 	@python3 tools/peers/run.py '$(PEERS)' '$(PEERS_PYTHON)'

@@ -10,6 +10,8 @@ use common::{Coat, ball_inertia, box_inertia};
 use isocoat::base::Kind;
 use isocoat::field::Shape;
 use isocoat::math::{Pose, Vec3};
+use isocoat::surface::mesh::Mesh;
+use isocoat::world::mesh::{MeshDesc, MeshWorkspace};
 use isocoat::world::{
     BodyDesc, LinkDesc, LinkId, LinkState, Response, Scheme, SkeletonDesc, SpringDesc, World, WorldDesc,
 };
@@ -204,5 +206,26 @@ fn a_snapshot_into_a_buffer_with_room_allocates_nothing() {
     let before = ALLOCATIONS.get();
     world.snapshot(&mut bytes);
     world.snapshot_into(&mut bytes).unwrap();
+    assert_eq!(ALLOCATIONS.get() - before, 0);
+}
+
+#[test]
+fn a_mesh_made_again_allocates_nothing() {
+    let mut world = World::new(WorldDesc::default()).unwrap();
+    let body = world.create_body(BodyDesc::default()).unwrap();
+    let link = world.create_link(body, LinkDesc::default()).unwrap();
+    for k in 0..5 {
+        let shape =
+            Shape::segment(Vec3::new(0.1 * f64::from(k), 0.0, 0.0), Vec3::new(0.0, 0.1, 0.1 * f64::from(k + 1)));
+        world.create_skeleton(link, SkeletonDesc { shape, thickness: 0.1, ..SkeletonDesc::default() }).unwrap();
+    }
+    let (mut workspace, mut mesh) = (MeshWorkspace::default(), Mesh::default());
+    let mut make = |world: &World, cell: f64| {
+        world.mesh_into(body, &MeshDesc::new(cell), &mut workspace, &mut mesh).unwrap();
+    };
+    make(&world, 0.01);
+    let before = ALLOCATIONS.get();
+    make(&world, 0.01);
+    make(&world, 0.02);
     assert_eq!(ALLOCATIONS.get() - before, 0);
 }

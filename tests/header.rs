@@ -27,6 +27,7 @@ const SECTIONS: &[(&str, &str)] = &[
     ("report", "What a step reports"),
     ("snapshot", "Snapshots"),
     ("query", "Queries"),
+    ("mesh", "Meshes"),
     ("volume", "Volumes"),
     ("substance", "Substances"),
     ("particle", ""),

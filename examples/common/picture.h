@@ -44,7 +44,7 @@ static void picture_colour(uint32_t key, double out[3])
 }
 
 /* Writes a picture of the bodies with a bit of the mask in their category; 0 when all went well. */
-static int picture_write(const isocoat_world *world, const picture_view *view, uint64_t mask, int width, int height,
+static inline int picture_write(const isocoat_world *world, const picture_view *view, uint64_t mask, int width, int height,
                          const char *path)
 {
     FILE *file = fopen(path, "wb");

@@ -2198,6 +2198,152 @@ isocoat_status isocoat_skeleton_get_seeds(const isocoat_world *world,
                                           size_t capacity,
                                           size_t *count);
 
+/* ---- Meshes ------------------------------------------------------------------------------------------------------ */
+
+/**
+ * A mesh of triangles, with the memory that making one takes: made again and again it soon asks for no more. It
+ * belongs to no world, and outlives them.
+ */
+typedef struct isocoat_mesh isocoat_mesh;
+
+/** What mesh of a body is wanted. Begin with isocoat_mesh_desc_default(). */
+typedef struct isocoat_mesh_desc {
+    /** Size of this struct in bytes, as the host knows it. */
+    uint32_t struct_size;
+    /** Which shape of the body, an ISOCOAT_DEFORMATION_ value. Default ISOCOAT_DEFORMATION_NONE. */
+    isocoat_deformation deformation;
+    /**
+     * Edge of the cells that the mesh is made of, in m: about the length of its triangles, > 0. What is thinner than
+     * a cell may be missed. Of a ball, a quarter of the thickness gives the volume within 3.2 %, an eighth within 1 %.
+     * Default 0, which must be replaced.
+     */
+    double cell_size;
+} isocoat_mesh_desc;
+
+/** How the territory of a skeleton is shown: an ISOCOAT_TERRITORY_ value. */
+typedef uint32_t isocoat_territory_style;
+
+/** A closed mesh with a vertex at each seed. */
+#define ISOCOAT_TERRITORY_PATCHES 0u
+/** A hexagon for each seed, in the tangent plane there: six vertices, in the order of the seeds. */
+#define ISOCOAT_TERRITORY_SCALES 1u
+
+/** A look at a mesh: arrays that belong to it. */
+typedef struct isocoat_mesh_view {
+    /** 3 doubles a vertex: where it is in the world, in m. */
+    const double *positions;
+    /** 3 doubles a vertex: the outward unit normal of the surface. */
+    const double *normals;
+    /** 3 vertices a triangle, counterclockwise from outside. */
+    const uint32_t *triangles;
+    /**
+     * A byte a vertex: 1 if it lies on the coat's surface, 0 if at another territory; NULL for a watertight mesh,
+     * where all do.
+     */
+    const bool *valid;
+    /** Number of vertices. */
+    size_t vertex_count;
+    /** Number of triangles. */
+    size_t triangle_count;
+} isocoat_mesh_view;
+
+/**
+ * Fills a descriptor with its defaults; isocoat_mesh_desc_default() calls it.
+ *
+ * - desc: receives at most size bytes, its struct_size among them; not NULL.
+ * - size: sizeof(isocoat_mesh_desc) as the host was compiled.
+ *
+ * Errors: INVALID_ARGUMENT. Threads: any.
+ */
+isocoat_status isocoat_mesh_desc_init(isocoat_mesh_desc *desc, size_t size);
+
+/**
+ * Creates an empty mesh.
+ *
+ * - mesh: receives the mesh; not NULL. Destroy it with isocoat_mesh_destroy.
+ *
+ * Errors: INVALID_ARGUMENT. Threads: any.
+ */
+ISOCOAT_MUST_USE isocoat_status isocoat_mesh_create(isocoat_mesh **mesh);
+
+/**
+ * Destroys a mesh. Its views and the pointer itself are void afterwards.
+ *
+ * - mesh: NULL does nothing.
+ *
+ * Errors: LOCKED while another call uses it; it then lives on. Threads: the mesh by this thread alone.
+ */
+isocoat_status isocoat_mesh_destroy(isocoat_mesh *mesh);
+
+/**
+ * Makes a watertight mesh of a body's surface, in place of what the mesh was: closed, each edge between two triangles,
+ * oriented outwards, with the vertices on the surface; the same input gives the same bits. It is empty for a body
+ * without enabled skeletons, and asks for no memory once the mesh has held one as large (of an undeformed body).
+ *
+ * - world: not NULL.
+ * - body: the body; it may be disabled. None of its enabled skeletons may be a plane.
+ * - desc: cell size and shape; not NULL.
+ * - mesh: receives the mesh; not NULL. After an error it is as it was. Its views are void.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE, UNSUPPORTED, CAPACITY for too small a cell size, LOCKED.
+ * Threads: reads the world; the mesh by this thread alone.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_body_make_mesh(const isocoat_world *world,
+                                      isocoat_body body,
+                                      const isocoat_mesh_desc *desc,
+                                      isocoat_mesh *mesh);
+
+/**
+ * Makes a mesh of a skeleton's territory from its seeds, valid or not, in place of what the mesh was: for display, at
+ * no cost but the seeds'. The meshes of a body's skeletons together show its coat. Which vertices are joined depends
+ * only on shape, thickness and number of seeds of the skeleton, so that a host may upload the triangles once.
+ *
+ * - world: not NULL.
+ * - skeleton: the skeleton; the mesh of a plane is empty, and that of a disabled skeleton or link.
+ * - style: an ISOCOAT_TERRITORY_ value.
+ * - mesh: receives the mesh; not NULL. After an error it is as it was. Its views are void.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, LOCKED. Threads: reads the world; the mesh by this thread alone.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_skeleton_make_mesh(const isocoat_world *world,
+                                          isocoat_skeleton skeleton,
+                                          isocoat_territory_style style,
+                                          isocoat_mesh *mesh);
+
+/**
+ * A look at a mesh, without copying it.
+ *
+ * - mesh: not NULL.
+ * - view: receives pointers into the mesh (not to be freed), which stay valid until it is made again or destroyed; not
+ *   NULL.
+ *
+ * Errors: INVALID_ARGUMENT, LOCKED. Threads: the mesh by this thread alone.
+ */
+ISOCOAT_MUST_USE isocoat_status isocoat_mesh_get_view(const isocoat_mesh *mesh, isocoat_mesh_view *view);
+
+/**
+ * Copies a mesh into the host's own memory, strided and in either precision; isocoat_mesh_get_view() says how large it
+ * is.
+ *
+ * - mesh: not NULL.
+ * - positions: receives 3 numbers a vertex, in m; skipped if its data is NULL.
+ * - normals: receives 3 numbers a vertex; skipped if its data is NULL.
+ * - vertex_capacity: vertices that fit into each of the two.
+ * - triangles: receives 3 vertices a triangle; NULL if not wanted.
+ * - triangle_capacity: triangles that fit.
+ *
+ * Errors: INVALID_ARGUMENT, BUFFER_TOO_SMALL, LOCKED; nothing is written then. Threads: the mesh by this thread alone.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_mesh_copy(const isocoat_mesh *mesh,
+                                 isocoat_buffer positions,
+                                 isocoat_buffer normals,
+                                 size_t vertex_capacity,
+                                 uint32_t *triangles,
+                                 size_t triangle_capacity);
+
 /* ---- Volumes ----------------------------------------------------------------------------------------------------- */
 
 /**
@@ -2809,6 +2955,13 @@ static inline isocoat_times isocoat_times_default(void)
     return times;
 }
 
+static inline isocoat_mesh_desc isocoat_mesh_desc_default(void)
+{
+    isocoat_mesh_desc desc;
+    isocoat_mesh_desc_init(&desc, sizeof desc);
+    return desc;
+}
+
 static inline isocoat_debug_draw isocoat_debug_draw_default(void)
 {
     isocoat_debug_draw draw;
@@ -2844,6 +2997,8 @@ ISOCOAT_MUST_USE static inline isocoat_status isocoat_check_abi(void)
         (uint32_t)sizeof(isocoat_substance_desc),
         (uint32_t)sizeof(isocoat_piece),
         (uint32_t)sizeof(isocoat_change),
+        (uint32_t)sizeof(isocoat_mesh_desc),
+        (uint32_t)sizeof(isocoat_mesh_view),
     };
     return isocoat_check_abi_of(ISOCOAT_VERSION, sizes, sizeof sizes / sizeof sizes[0]);
 }

@@ -49,6 +49,7 @@ using surface_point = isocoat_surface_point;
 using particle = isocoat_particle; /* a name in its substance */
 using piece = isocoat_piece;
 using change = isocoat_change;
+using mesh_view = isocoat_mesh_view;
 
 /* The status of a call that failed; what() says what was wrong, with the value and the range. */
 class error : public std::runtime_error {
@@ -186,6 +187,56 @@ struct change_list {
 
 class link;
 
+/* A mesh of triangles, with the memory that making one takes: used again, it soon asks for no more. Movable, not
+ * copyable; it belongs to no world. */
+class mesh {
+public:
+    mesh()
+    {
+        isocoat_mesh *created = nullptr;
+        check(isocoat_mesh_create(&created));
+        mesh_.reset(created);
+    }
+
+    /* The mesh of the C API; it still belongs to this. */
+    isocoat_mesh *get() const noexcept { return mesh_.get(); }
+
+    /* Pointers into it, until it is made again, moved to or destroyed. */
+    mesh_view view() const
+    {
+        mesh_view look{};
+        check(isocoat_mesh_get_view(mesh_.get(), &look));
+        return look;
+    }
+    std::vector<vec3> positions() const
+    {
+        std::vector<vec3> list(view().vertex_count);
+        if (!list.empty()) check(isocoat_mesh_copy(get(), buffer_of(list), {}, list.size(), nullptr, 0));
+        return list;
+    }
+    std::vector<vec3> normals() const
+    {
+        std::vector<vec3> list(view().vertex_count);
+        if (!list.empty()) check(isocoat_mesh_copy(get(), {}, buffer_of(list), list.size(), nullptr, 0));
+        return list;
+    }
+    std::vector<std::array<std::uint32_t, 3>> triangles() const
+    {
+        std::vector<std::array<std::uint32_t, 3>> list(view().triangle_count);
+        if (!list.empty()) check(isocoat_mesh_copy(get(), {}, {}, 0, list.front().data(), list.size()));
+        return list;
+    }
+
+private:
+    struct destroyer {
+        void operator()(isocoat_mesh *raw) const noexcept { isocoat_mesh_destroy(raw); }
+    };
+
+    static isocoat_buffer buffer_of(std::vector<vec3> &list) { return {list.data(), 0, ISOCOAT_FORMAT_F64}; }
+
+    std::unique_ptr<isocoat_mesh, destroyer> mesh_;
+};
+
 /* A primitive fixed in a link's frame, and the field it emits. */
 class skeleton : public detail::noun<isocoat_skeleton> {
 public:
@@ -221,6 +272,11 @@ public:
     double target_volume() const { return detail::read(0.0, isocoat_skeleton_get_target_volume, world_, raw_); }
     void set_target_volume(double target) { check(isocoat_skeleton_set_target_volume(world_, raw_, target)); }
     double offset() const { return detail::read(0.0, isocoat_skeleton_get_offset, world_, raw_); }
+    /* A mesh of its territory from its seeds, in place of what the mesh was. */
+    void make_mesh(mesh &out, isocoat_territory_style style = ISOCOAT_TERRITORY_PATCHES) const
+    {
+        check(isocoat_skeleton_make_mesh(world_, raw_, style, out.get()));
+    }
     seed_list seeds() const
     {
         std::size_t count = 0;
@@ -395,6 +451,14 @@ public:
         bool found = false;
         check(isocoat_body_closest_point_deformed(world_, raw_, point.data(), deformation, &closest, &found));
         return found ? std::optional<surface_point>(closest) : std::nullopt;
+    }
+    /* A watertight mesh of its surface with cells of this edge, in place of what the mesh was. */
+    void make_mesh(mesh &out, double cell_size, isocoat_deformation deformation = ISOCOAT_DEFORMATION_NONE) const
+    {
+        isocoat_mesh_desc desc = isocoat_mesh_desc_default();
+        desc.cell_size = cell_size;
+        desc.deformation = deformation;
+        check(isocoat_body_make_mesh(world_, raw_, &desc, out.get()));
     }
 };
 

@@ -3,7 +3,7 @@
 //! Mechanism and nouns are apart. Mechanism: [`status`] (codes, messages), [`version`], [`guard`] (panics, locks),
 //! [`mod@pointer`] and [`descriptor`] (memory of the host), [`handle`], [`buffer`]. Nouns: [`world`], [`body`],
 //! [`link`], [`skeleton`], [`blend`], [`spring`], [`substance`], [`particle`], [`piece`], [`math`], and what is done
-//! with them: [`motion`], [`bulk`], [`report`], [`snapshot`], [`query`], [`draw`], [`tasks`], [`volume`].
+//! with them: [`motion`], [`bulk`], [`report`], [`snapshot`], [`query`], [`mesh`], [`draw`], [`tasks`], [`volume`].
 //!
 //! Nothing here computes: every function checks the host's pointers, translates, calls the public Rust API, and
 //! translates back. The comments are the manual that goes into the header.
@@ -21,6 +21,7 @@ pub mod guard;
 pub mod handle;
 pub mod link;
 pub mod math;
+pub mod mesh;
 pub mod motion;
 pub mod particle;
 pub mod piece;

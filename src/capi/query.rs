@@ -81,7 +81,7 @@ pub const ISOCOAT_DEFORMATION_CONTACT: isocoat_deformation = 1;
 /// Flattened, and bulging round its contacts as isocoat_body_desc::bulge_width says.
 pub const ISOCOAT_DEFORMATION_BULGES: isocoat_deformation = 2;
 
-fn deformation_from_c(deformation: isocoat_deformation) -> Checked<Deformation> {
+pub(super) fn deformation_from_c(deformation: isocoat_deformation) -> Checked<Deformation> {
     match deformation {
         ISOCOAT_DEFORMATION_NONE => Ok(Deformation::None),
         ISOCOAT_DEFORMATION_CONTACT => Ok(Deformation::Contact),

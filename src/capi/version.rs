@@ -79,6 +79,8 @@ const LAYOUTS: &[Layout] = &[
     growable::<super::substance::isocoat_substance_desc>(),
     fixed::<super::piece::isocoat_piece>("isocoat_piece"),
     fixed::<super::piece::isocoat_change>("isocoat_change"),
+    growable::<super::mesh::isocoat_mesh_desc>(),
+    fixed::<super::mesh::isocoat_mesh_view>("isocoat_mesh_view"),
 ];
 
 /// What isocoat_check_abi calls: compares a host's version and struct sizes with the library's.

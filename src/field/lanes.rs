@@ -46,6 +46,76 @@ pub fn evaluate(
     Dispatch::best().evaluate(skeletons, points, values, gradients);
 }
 
+/// [`evaluate`] of some of the skeletons, by their positions, summed in this order.
+///
+/// # Panics
+///
+/// When `values` or `gradients` is not as long as `points`, or a position is none.
+pub fn evaluate_some(
+    skeletons: &[Placed],
+    some: &[u32],
+    points: &[[f64; 3]],
+    values: Option<&mut [f64]>,
+    gradients: Option<&mut [[f64; 3]]>,
+) {
+    Dispatch::best().run(Query { skeletons, some: Some(some), points, values, gradients });
+}
+
+/// Eight cubes with the frame's axes, and a smaller one in the middle of each.
+#[derive(Clone, Copy, Debug)]
+pub struct Cubes {
+    /// Their middles \[m\].
+    pub centers: [[f64; 3]; 8],
+    /// Half the edge of all of them \[m\].
+    pub half: f64,
+    /// Half the edge of the smaller ones \[m\].
+    pub inner: f64,
+}
+
+/// What fields can be in eight [`Cubes`].
+#[derive(Clone, Debug, Default)]
+pub struct Spans {
+    /// At least that much is the sum of the fields in each cube.
+    pub least: [f64; 8],
+    /// At most that much.
+    pub most: [f64; 8],
+    /// At least that much is one of the fields, all over the cube.
+    pub strongest: [f64; 8],
+    /// For each skeleton, which cubes its field reaches: [`Spans::REACH`], [`Spans::INNER`] and [`Spans::ALL_OVER`] for
+    /// the first cube, one bit to the left for the next, and so on.
+    pub reach: Vec<u32>,
+}
+
+impl Spans {
+    /// The field may reach the cube.
+    pub const REACH: u32 = 1;
+    /// The field may reach the smaller cube.
+    pub const INNER: u32 = 1 << 8;
+    /// The field reaches the smaller cube all over.
+    pub const ALL_OVER: u32 = 1 << 16;
+}
+
+/// Bounds of the fields of some skeletons, by their positions, in eight cubes. Fields fall with distance, so bounds of
+/// the distance are bounds of the field: exact ones for points, and for other shapes those that the distance's slope of
+/// 1 gives. Rounding is not taken into account.
+///
+/// # Panics
+///
+/// When a position is none.
+pub fn spans(skeletons: &[Placed], some: &[u32], cubes: &Cubes, out: &mut Spans) {
+    out.reach.clear();
+    let search = Search { skeletons, some, cubes, out };
+    match Dispatch::best().0 {
+        InstructionSet::Baseline => search.run::<BASELINE_WIDTH>(),
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: `best` makes this variant only when the processor has AVX2.
+        InstructionSet::Avx2 => unsafe { spans_avx2(search) },
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: as above, with AVX-512F.
+        InstructionSet::Avx512 => unsafe { spans_avx512(search) },
+    }
+}
+
 /// An instruction set that this processor has: a value of this type is the proof that it does.
 ///
 /// All give the same bits. To choose one is for tests and benchmarks; [`evaluate`] takes the widest.
@@ -113,7 +183,10 @@ impl Dispatch {
         values: Option<&mut [f64]>,
         gradients: Option<&mut [[f64; 3]]>,
     ) {
-        let query = Query { skeletons, points, values, gradients };
+        self.run(Query { skeletons, some: None, points, values, gradients });
+    }
+
+    fn run(self, query: Query) {
         match self.0 {
             InstructionSet::Baseline => query.run::<BASELINE_WIDTH>(),
             #[cfg(target_arch = "x86_64")]
@@ -141,9 +214,22 @@ fn run_avx512(query: Query) {
     query.run::<8>();
 }
 
-/// The arguments of [`evaluate`].
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn spans_avx2(search: Search) {
+    search.run::<4>();
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f")]
+fn spans_avx512(search: Search) {
+    search.run::<8>();
+}
+
+/// The arguments of [`evaluate`] and [`evaluate_some`].
 struct Query<'a> {
     skeletons: &'a [Placed],
+    some: Option<&'a [u32]>,
     points: &'a [[f64; 3]],
     values: Option<&'a mut [f64]>,
     gradients: Option<&'a mut [[f64; 3]]>,
@@ -154,7 +240,8 @@ struct Query<'a> {
 impl Query<'_> {
     #[inline(always)]
     fn run<const W: usize>(self) {
-        let Query { skeletons, points, mut values, mut gradients } = self;
+        let Query { skeletons, some, points, mut values, mut gradients } = self;
+        let count = some.map_or(skeletons.len(), <[u32]>::len);
         assert!(values.as_ref().is_none_or(|v| v.len() == points.len()), "values and points differ in length");
         assert!(gradients.as_ref().is_none_or(|g| g.len() == points.len()), "gradients and points differ in length");
         let mut blocks = [Block::<W>::EMPTY; CHUNK];
@@ -164,11 +251,14 @@ impl Query<'_> {
             for (block, points) in blocks.iter_mut().zip(points.chunks(W)) {
                 block.load(points);
             }
-            for skeleton in skeletons {
+            let mut falloff = Falloff::NONE;
+            for index in 0..count {
+                let skeleton = &skeletons[some.map_or(index, |some| some[index] as usize)];
+                falloff.fit(&skeleton.profile, skeleton.shape.is_solid());
                 if gradients.is_some() {
-                    add::<W, true>(blocks, skeleton);
+                    add::<W, true>(blocks, skeleton, &falloff);
                 } else {
-                    add::<W, false>(blocks, skeleton);
+                    add::<W, false>(blocks, skeleton, &falloff);
                 }
             }
             if let Some(values) = &mut values {
@@ -185,6 +275,96 @@ impl Query<'_> {
             }
         }
     }
+}
+
+/// The arguments of [`spans`].
+struct Search<'a> {
+    skeletons: &'a [Placed],
+    some: &'a [u32],
+    cubes: &'a Cubes,
+    out: &'a mut Spans,
+}
+
+impl Search<'_> {
+    #[inline(always)]
+    fn run<const W: usize>(self) {
+        let Search { skeletons, some, cubes, out } = self;
+        let mut blocks = [SpanBlock::<W>::EMPTY; 8];
+        let blocks = &mut blocks[..8 / W];
+        for (block, centers) in blocks.iter_mut().zip(cubes.centers.chunks_exact(W)) {
+            for (lane, center) in centers.iter().enumerate() {
+                block.center.iter_mut().zip(center).for_each(|(lanes, x)| lanes.0[lane] = *x);
+            }
+        }
+        let mut falloff = Falloff::NONE;
+        for index in some {
+            let skeleton = &skeletons[*index as usize];
+            falloff.fit(&skeleton.profile, skeleton.shape.is_solid());
+            let reach = match &skeleton.shape {
+                Shape::Point(a) => span_shape(blocks, &ToPoint(*a), &falloff, cubes),
+                Shape::Segment(a, b) => span_shape(blocks, &ToSegment::new(a, b), &falloff, cubes),
+                Shape::Triangle(a, b, c) => span_shape(blocks, &ToTriangle::new(a, b, c), &falloff, cubes),
+                Shape::Box { center, half, axes } => {
+                    span_shape(blocks, &ToBox::new(center, half, axes), &falloff, cubes)
+                }
+                Shape::Plane { point, normal } => {
+                    span_shape(blocks, &ToPlane { point: *point, normal: *normal }, &falloff, cubes)
+                }
+            };
+            out.reach.push(reach);
+        }
+        for (index, block) in blocks.iter().enumerate() {
+            let lanes = index * W..(index + 1) * W;
+            out.least[lanes.clone()].copy_from_slice(&block.least.0);
+            out.most[lanes.clone()].copy_from_slice(&block.most.0);
+            out.strongest[lanes].copy_from_slice(&block.strongest.0);
+        }
+    }
+}
+
+/// One register of cubes, and the bounds in them.
+#[derive(Clone, Copy)]
+#[repr(align(64))]
+struct SpanBlock<const W: usize> {
+    center: [Lanes<W>; 3],
+    least: Lanes<W>,
+    most: Lanes<W>,
+    strongest: Lanes<W>,
+}
+
+impl<const W: usize> SpanBlock<W> {
+    const EMPTY: Self = {
+        let zero = Lanes([0.0; W]);
+        Self { center: [zero; 3], least: zero, most: zero, strongest: zero }
+    };
+}
+
+/// Adds the bounds of one skeleton's field in each cube, and gives what it reaches, see [`Spans::reach`].
+#[inline(always)]
+fn span_shape<S: Distance, const W: usize>(
+    blocks: &mut [SpanBlock<W>],
+    shape: &S,
+    falloff: &Falloff,
+    cubes: &Cubes,
+) -> u32 {
+    let (zero, radius) = (Lanes::splat(0.0), Lanes::splat(falloff.radius));
+    let square = radius * radius;
+    let mut reach = 0;
+    for (index, block) in blocks.iter_mut().enumerate() {
+        let (near, far) = shape.span(block.center, cubes.half);
+        let (near_inner, far_inner) = shape.square_span(block.center, cubes.inner);
+        let least = falloff.value_slope(far, S::SOLID).0;
+        block.least = block.least + least;
+        block.strongest = block.strongest.max(least);
+        block.most = block.most + falloff.value_slope(near, S::SOLID).0;
+        // Bits as numbers, which add up exactly: comparisons stay in registers.
+        let bits = |bit: u32| Lanes(std::array::from_fn(|lane| f64::from(bit << lane)));
+        let sum = radius.where_greater(near, bits(Spans::REACH), zero)
+            + square.where_greater(near_inner, bits(Spans::INNER), zero)
+            + square.where_greater(far_inner, bits(Spans::ALL_OVER), zero);
+        reach |= (sum.sum() as u32) << (index * W);
+    }
+    reach
 }
 
 /// Blocks that are worked on together: enough to spread the cost of a skeleton's constants, few enough to stay in the
@@ -225,24 +405,22 @@ impl<const W: usize> Block<W> {
 
 /// Adds the field of one skeleton at every point.
 #[inline(always)]
-fn add<const W: usize, const GRADIENT: bool>(blocks: &mut [Block<W>], skeleton: &Placed) {
-    let profile = &skeleton.profile;
+fn add<const W: usize, const GRADIENT: bool>(blocks: &mut [Block<W>], skeleton: &Placed, falloff: &Falloff) {
     match &skeleton.shape {
-        Shape::Point(a) => add_shape::<_, W, GRADIENT>(blocks, &ToPoint(*a), profile),
-        Shape::Segment(a, b) => add_shape::<_, W, GRADIENT>(blocks, &ToSegment::new(a, b), profile),
-        Shape::Triangle(a, b, c) => add_shape::<_, W, GRADIENT>(blocks, &ToTriangle::new(a, b, c), profile),
+        Shape::Point(a) => add_shape::<_, W, GRADIENT>(blocks, &ToPoint(*a), falloff),
+        Shape::Segment(a, b) => add_shape::<_, W, GRADIENT>(blocks, &ToSegment::new(a, b), falloff),
+        Shape::Triangle(a, b, c) => add_shape::<_, W, GRADIENT>(blocks, &ToTriangle::new(a, b, c), falloff),
         Shape::Box { center, half, axes } => {
-            add_shape::<_, W, GRADIENT>(blocks, &ToBox::new(center, half, axes), profile)
+            add_shape::<_, W, GRADIENT>(blocks, &ToBox::new(center, half, axes), falloff)
         }
         Shape::Plane { point, normal } => {
-            add_shape::<_, W, GRADIENT>(blocks, &ToPlane { point: *point, normal: *normal }, profile)
+            add_shape::<_, W, GRADIENT>(blocks, &ToPlane { point: *point, normal: *normal }, falloff)
         }
     }
 }
 
 #[inline(always)]
-fn add_shape<S: Distance, const W: usize, const GRADIENT: bool>(blocks: &mut [Block<W>], shape: &S, profile: &Profile) {
-    let falloff = Falloff::new(profile, S::SOLID);
+fn add_shape<S: Distance, const W: usize, const GRADIENT: bool>(blocks: &mut [Block<W>], shape: &S, falloff: &Falloff) {
     // The fences cost nothing at run time. They keep the compiler from vectorising the loops over blocks on top of the
     // lanes, which would fill them with shuffles and halve the speed.
     if S::TWO_PASSES {
@@ -254,7 +432,7 @@ fn add_shape<S: Distance, const W: usize, const GRADIENT: bool>(blocks: &mut [Bl
     for block in blocks {
         compiler_fence(Ordering::SeqCst);
         let away = if S::TWO_PASSES { block.away } else { shape.away(block.point) };
-        let (value, slope) = falloff.value_slope(away.distance);
+        let (value, slope) = falloff.value_slope(away.distance, S::SOLID);
         block.value = block.value + value;
         if GRADIENT {
             let scale = slope * falloff.inverse_length(away.length);
@@ -270,8 +448,10 @@ fn add_shape<S: Distance, const W: usize, const GRADIENT: bool>(blocks: &mut [Bl
 /// With `u = clamp((R - d) / (R - t), 0, 1)` and the depth `x = max(t - d, 0)` the pieces of value and slope add up,
 /// because the outer piece keeps its value and slope of the surface inside, and the inner one is zero outside:
 /// `F = u² (a + b u) + x (k + bend x / 2)`, and likewise for the slope.
+#[derive(Clone, Copy)]
 struct Falloff {
-    /// Known when compiling: solid skeletons have a core and no cap.
+    /// What it was made from: bodies of many skeletons often have one profile.
+    profile: Profile,
     solid: bool,
     thickness: f64,
     radius: f64,
@@ -292,6 +472,32 @@ struct Falloff {
 }
 
 impl Falloff {
+    /// Of no profile.
+    const NONE: Self = Self {
+        profile: Profile { isovalue: 0.0, thickness: 0.0, stiffness: 0.0, stiffening: 0.0, radius: 0.0, cap: 0.0 },
+        solid: false,
+        thickness: 0.0,
+        radius: 0.0,
+        inverse_width: 0.0,
+        a: 0.0,
+        b: 0.0,
+        slope_a: 0.0,
+        slope_b: 0.0,
+        stiffness: 0.0,
+        core_stiffness: 0.0,
+        bend: 0.0,
+        half_cap: 0.0,
+        inverse_cap: 0.0,
+    };
+
+    /// Becomes that of this profile.
+    #[inline(always)]
+    fn fit(&mut self, profile: &Profile, solid: bool) {
+        if self.profile != *profile || self.solid != solid {
+            *self = Self::new(profile, solid);
+        }
+    }
+
     #[inline(always)]
     fn new(profile: &Profile, solid: bool) -> Self {
         let &Profile { isovalue, thickness, stiffness, stiffening, radius, cap } = profile;
@@ -300,6 +506,7 @@ impl Falloff {
         let (a, b) = (3.0 * isovalue - kw, kw - 2.0 * isovalue);
         let cap = if solid { 0.0 } else { cap };
         Self {
+            profile: *profile,
             solid,
             thickness,
             radius,
@@ -316,9 +523,10 @@ impl Falloff {
         }
     }
 
-    /// `F(d)` and the slope `F'(d)`; with the cap of a thin skeleton, the slope before the factor `min(d / cap, 1)`.
+    /// `F(d)` and the slope `F'(d)`, for a shape that is solid or not, which is known when compiling; with the
+    /// cap of a thin skeleton, the slope before the factor `min(d / cap, 1)`.
     #[inline(always)]
-    fn value_slope<const W: usize>(&self, d: Lanes<W>) -> (Lanes<W>, Lanes<W>) {
+    fn value_slope<const W: usize>(&self, d: Lanes<W>, solid: bool) -> (Lanes<W>, Lanes<W>) {
         let s = Lanes::splat;
         let (zero, one) = (s(0.0), s(1.0));
 
@@ -326,7 +534,7 @@ impl Falloff {
         let outer = u * u * (s(self.a) + s(self.b) * u);
         let outer_slope = u * (s(self.slope_a) + s(self.slope_b) * u);
 
-        let (depth, core) = if self.solid {
+        let (depth, core) = if solid {
             // Below the surface of the core, at depth t, the field rises linearly.
             let depth = (s(self.thickness) - d).max(zero);
             let bent = depth.min(s(self.thickness));
@@ -339,7 +547,7 @@ impl Falloff {
         };
         let inner = depth * (s(self.stiffness) + s(0.5 * self.bend) * depth);
         let value = outer + inner;
-        (if self.solid { value + core } else { value }, outer_slope - s(self.bend) * depth)
+        (if solid { value + core } else { value }, outer_slope - s(self.bend) * depth)
     }
 
     /// `min(1 / length, 1 / cap)`: what turns a slope before the cap's factor, and an offset of this length, into a
@@ -352,6 +560,9 @@ impl Falloff {
 
 /// Stands for a cap of no width \[m\]: its inverse is finite, and no length of importance is as short.
 const TINY: f64 = 1e-150;
+
+/// Half the diagonal of a cube over half its edge.
+const SQRT_3: f64 = 1.732_050_807_568_877_3;
 
 /// How far points are from a shape, and which way: the gradient of the distance is `direction / length`.
 #[derive(Clone, Copy)]
@@ -374,6 +585,22 @@ trait Distance {
 
     fn away<const W: usize>(&self, p: [Lanes<W>; 3]) -> Away<W>;
 
+    /// Bounds of the distance in a cube with this middle and half this edge.
+    #[inline(always)]
+    fn span<const W: usize>(&self, center: [Lanes<W>; 3], half: f64) -> (Lanes<W>, Lanes<W>) {
+        let (distance, radius) = (self.away(center).distance, Lanes::splat(half * SQRT_3));
+        let near = distance - radius;
+        (if Self::SOLID { near } else { near.max(Lanes::splat(0.0)) }, distance + radius)
+    }
+
+    /// The squares of such bounds; 0 within a shape.
+    #[inline(always)]
+    fn square_span<const W: usize>(&self, center: [Lanes<W>; 3], half: f64) -> (Lanes<W>, Lanes<W>) {
+        let (near, far) = self.span(center, half);
+        let (near, far) = (near.max(Lanes::splat(0.0)), far.max(Lanes::splat(0.0)));
+        (near * near, far * far)
+    }
+
     /// Turns a direction of the shape's frame into the frame of the points.
     #[inline(always)]
     fn to_world<const W: usize>(&self, direction: [Lanes<W>; 3]) -> [Lanes<W>; 3] {
@@ -392,6 +619,19 @@ impl Distance for ToPoint {
         let direction = sub(p, splat(&self.0));
         let distance = dot(direction, direction).sqrt();
         Away { distance, direction, length: distance }
+    }
+
+    #[inline(always)]
+    fn span<const W: usize>(&self, center: [Lanes<W>; 3], half: f64) -> (Lanes<W>, Lanes<W>) {
+        let (near, far) = self.square_span(center, half);
+        (near.sqrt(), far.sqrt())
+    }
+
+    #[inline(always)]
+    fn square_span<const W: usize>(&self, center: [Lanes<W>; 3], half: f64) -> (Lanes<W>, Lanes<W>) {
+        let (offset, half) = (sub(center, splat(&self.0)).map(Lanes::abs), Lanes::splat(half));
+        let (near, far) = (offset.map(|x| (x - half).max(Lanes::splat(0.0))), offset.map(|x| x + half));
+        (dot(near, near), dot(far, far))
     }
 }
 
@@ -652,19 +892,6 @@ impl<const W: usize> Lanes<W> {
         self.zip(other, |x, y| if y < x { y } else { x })
     }
 
-    /// In pairs, so that the sum is the same bits in any registers.
-    #[inline(always)]
-    pub fn sum(self) -> f64 {
-        let (mut sums, mut width) = (self.0, W);
-        while width > 1 {
-            width /= 2;
-            for lane in 0..width {
-                sums[lane] += sums[lane + width];
-            }
-        }
-        sums[0]
-    }
-
     #[inline(always)]
     fn clamp(self, low: Self, high: Self) -> Self {
         self.max(low).min(high)
@@ -678,6 +905,19 @@ impl<const W: usize> Lanes<W> {
     #[inline(always)]
     fn abs(self) -> Self {
         Self(self.0.map(f64::abs))
+    }
+
+    /// Of all lanes, halves first.
+    #[inline(always)]
+    pub fn sum(mut self) -> f64 {
+        let mut width = W;
+        while width > 1 {
+            width /= 2;
+            for lane in 0..width {
+                self.0[lane] += self.0[lane + width];
+            }
+        }
+        self.0[0]
     }
 }
 
@@ -771,7 +1011,7 @@ mod tests {
     /// The bits of values and gradients, with lanes of any width.
     fn bits_at_width<const W: usize>(skeletons: &[Placed], points: &[[f64; 3]]) -> Vec<u64> {
         let (mut values, mut gradients) = (vec![f64::NAN; points.len()], vec![[f64::NAN; 3]; points.len()]);
-        Query { skeletons, points, values: Some(&mut values), gradients: Some(&mut gradients) }.run::<W>();
+        Query { skeletons, some: None, points, values: Some(&mut values), gradients: Some(&mut gradients) }.run::<W>();
         bits(&values, &gradients)
     }
 
@@ -841,6 +1081,52 @@ mod tests {
                 if let Some((last, rest)) = points.split_last() {
                     let (value, gradient) = sums(dispatch, &skeletons, &[*last]);
                     prop_assert_eq!(bits(&value, &gradient), bits(&values[rest.len()..], &gradients[rest.len()..]));
+                }
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn some_skeletons_give_the_bits_of_a_list_of_them(
+            skeletons in prop::collection::vec(skeletons(), 1..6),
+            points in prop::collection::vec(vectors(1.5 * SIZE), 1..40),
+        ) {
+            let points: Vec<[f64; 3]> = points.into_iter().map(Into::into).collect();
+            let some: Vec<u32> = (0..skeletons.len() as u32).rev().step_by(2).collect();
+            let list: Vec<Placed> = some.iter().map(|index| skeletons[*index as usize]).collect();
+            let (values, gradients) = sums(Dispatch::best(), &list, &points);
+            let (mut others, mut slopes) = (values.clone(), gradients.clone());
+            others.fill(f64::NAN);
+            evaluate_some(&skeletons, &some, &points, Some(&mut others), Some(&mut slopes));
+            prop_assert_eq!(bits(&values, &gradients), bits(&others, &slopes));
+        }
+
+        #[test]
+        fn fields_keep_to_their_bounds_in_cubes(
+            skeletons in prop::collection::vec(skeletons(), 1..6), center in vectors(SIZE), half in 0.01..1.0f64,
+            places in prop::collection::vec(vectors(1.0), 10),
+        ) {
+            let all: Vec<u32> = (0..skeletons.len() as u32).collect();
+            let centers = std::array::from_fn(|k| [center.x + 0.3 * k as f64, center.y, center.z]);
+            let cubes = Cubes { centers, half, inner: 0.5 * half };
+            let mut spans = Spans::default();
+            super::spans(&skeletons, &all, &cubes, &mut spans);
+            let slack = 1e-9 * skeletons.iter().map(|k| k.profile.peak() + SIZE * k.profile.lipschitz()).sum::<f64>();
+            for k in 0..8 {
+                for place in &places {
+                    let p = Vec3::from(centers[k]) + place * half;
+                    let fields: Vec<f64> = skeletons.iter().map(|s| s.value(&p)).collect();
+                    let (sum, largest) = (fields.iter().sum::<f64>(), fields.iter().fold(0.0, |x, y| f64::max(x, *y)));
+                    prop_assert!(spans.least[k] <= sum + slack && sum <= spans.most[k] + slack);
+                    prop_assert!(spans.strongest[k] <= largest + slack);
+                    for (field, reach) in fields.iter().zip(&spans.reach) {
+                        prop_assert!(*field <= slack || reach >> k & Spans::REACH != 0);
+                    }
+                    let inner = Vec3::from(centers[k]) + place * (0.5 * half);
+                    for (skeleton, reach) in skeletons.iter().zip(&spans.reach) {
+                        prop_assert!(skeleton.value(&inner) <= slack || reach >> k & Spans::INNER != 0);
+                    }
                 }
             }
         }

@@ -3,6 +3,8 @@
 
 pub mod closest;
 pub mod deformed;
+pub mod mesh;
+pub mod patches;
 pub mod ray;
 
 use crate::math::Vec3;

@@ -11,6 +11,7 @@ pub mod desc;
 pub mod draw;
 pub mod events;
 mod gather;
+pub mod mesh;
 mod motion;
 pub mod query;
 mod respond;

@@ -1,6 +1,7 @@
 //! Questions between steps: fields, rays, overlaps, closest points, seeds.
 
 use super::{Body, BodyId, Deformation, LinkId, SkeletonId, World};
+use crate::coat::seeds::Ray;
 use crate::coat::{Coat, seeds, territory};
 use crate::error::{Error, Result, out_of_range, require, require_finite};
 use crate::math::{Pose, Vec3};
@@ -286,26 +287,38 @@ impl World {
     /// the skeleton's (or else the world's) seed count; none for a plane, which has no bounds to spread them over, and
     /// none while the skeleton or its link is disabled.
     pub fn seeds(&self, skeleton: SkeletonId) -> Result<Vec<Seed>> {
-        let link = self.skeletons.get(skeleton)?.link as usize;
-        let posed = self.posed_coat(self.links[link].body as usize);
-        let Some(index) = posed.skeletons.iter().position(|k| *k == skeleton.index()) else {
-            return Ok(Vec::new());
-        };
-        let desc = &self.skeletons[skeleton.index()].desc;
-        let count = if desc.seed_count == 0 { self.desc.seed_count } else { desc.seed_count };
-        let mut rays = Vec::new();
-        seeds::rays(&desc.shape, desc.thickness, count as usize, &mut rays);
-        let pose = posed.poses[index];
-        for ray in &mut rays {
-            *ray = ray.transformed(&pose);
-        }
-        let mut ends = Vec::new();
-        territory::seeds(&posed.coat, index, &rays, &mut ends);
+        let Followed { origin, seeds, .. } = self.follow(skeleton)?;
         let globalise = |seed: &territory::Seed| Seed {
-            position: posed.globalise(&seed.position),
+            position: seed.position + origin,
             normal: seed.normal,
             valid: seed.is_valid(),
         };
-        Ok(ends.iter().map(globalise).collect())
+        Ok(seeds.iter().map(globalise).collect())
     }
+
+    /// The rays of a skeleton, in the frame of its link, and where they end, in a frame at `origin`; none for a plane, or
+    /// while it is disabled.
+    pub(super) fn follow(&self, skeleton: SkeletonId) -> Result<Followed> {
+        let link = self.skeletons.get(skeleton)?.link as usize;
+        let posed = self.posed_coat(self.links[link].body as usize);
+        let mut followed = Followed { origin: posed.coat.origin, ..Followed::default() };
+        let Some(index) = posed.skeletons.iter().position(|k| *k == skeleton.index()) else {
+            return Ok(followed);
+        };
+        let desc = &self.skeletons[skeleton.index()].desc;
+        let count = if desc.seed_count == 0 { self.desc.seed_count } else { desc.seed_count };
+        seeds::rays(&desc.shape, desc.thickness, count as usize, &mut followed.rays);
+        let pose = posed.poses[index];
+        let rays: Vec<Ray> = followed.rays.iter().map(|ray| ray.transformed(&pose)).collect();
+        territory::seeds(&posed.coat, index, &rays, &mut followed.seeds);
+        Ok(followed)
+    }
+}
+
+/// The rays of a skeleton, followed to their ends.
+#[derive(Default)]
+pub(super) struct Followed {
+    pub(super) origin: Vec3,
+    pub(super) rays: Vec<Ray>,
+    pub(super) seeds: Vec<territory::Seed>,
 }

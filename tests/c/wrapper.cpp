@@ -361,6 +361,14 @@ static void queries()
     CHECK(seeds.positions.size() >= 64 && seeds.normals.size() == seeds.positions.size() && seeds.valid[0] == 1);
 
     const isocoat::skeleton point = bodies[0].links()[0].skeletons()[0];
+    isocoat::mesh mesh;
+    bodies[0].make_mesh(mesh, 0.02);
+    CHECK(mesh.triangles().size() == 2 * mesh.positions().size() - 4);
+    CHECK(mesh.normals().size() == mesh.view().vertex_count);
+    bodies[0].make_mesh(mesh, 0.02, ISOCOAT_DEFORMATION_CONTACT);
+    CHECK(mesh.view().vertex_count > 0 && mesh.view().valid == nullptr);
+    point.make_mesh(mesh);
+    CHECK(mesh.positions() == seeds.positions);
     CHECK(point.volume() == bodies[0].volume() && point.volume() > 0.0 && point.offset() == 0.0);
     try {
         isocoat::skeleton(point).set_target_volume(point.target_volume());

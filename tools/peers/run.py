@@ -173,16 +173,39 @@ def drake(programs, python):
     return text, bars
 
 
+def splashsurf(programs):
+    """The section on splashsurf, and its rows of bars."""
+    title = "\n## The surface of particles: splashsurf\n\n"
+    program = programs / "mesh-particles"
+    if not program.exists():
+        return title + "Not measured: `cargo build` of tools/peers/splashsurf did not succeed.\n", []
+    print("splashsurf:", flush=True)
+    text = title + (
+        "Particles a spacing apart in a ball, fields that reach twice as far, cells of a quarter. splashsurf_lib 0.14 in "
+        "single precision with SIMD, its density and decomposition included; isocoat in double, with normals. Shortest "
+        "of nine calls each, in turns.\n\n"
+    )
+    cells, bars = [], []
+    for row in rows_of(run([program])):
+        peer, mine = row["splashsurf_ms"], row["isocoat_ms"]
+        cells.append([f"{row['particles']:.0f}", digits(peer), f"{row['splashsurf_triangles']:.0f}", digits(mine),
+                      f"{row['isocoat_triangles']:.0f}", f"{peer / mine:.2g}"])
+        bars.append([f"mesh of {row['particles']:.0f} particles", f"{digits(peer)} ms", f"{digits(mine)} ms",
+                     f"{peer / mine:.2g}", "at least 2", verdict(peer / mine >= 2)])
+    return text + table(["particles", "splashsurf [ms]", "triangles", "isocoat [ms]", "triangles", "ratio"], cells), bars
+
+
 def main():
     programs, python = pathlib.Path(sys.argv[1]), sys.argv[2]
     bullet_text, bullet_bars = bullet(programs)
     drake_text, drake_bars = drake(programs, python)
-    bars = drake_bars + bullet_bars
+    mesh_text, mesh_bars = splashsurf(programs)
+    bars = drake_bars + bullet_bars + mesh_bars
     page = HEAD + f"\nMeasured with {os.cpu_count()} processors, of which one was used.\n"
     if bars:
         page += "\n" + table(["", "peer", "isocoat", "ratio", "bar", ""], bars)
-    page += drake_text + bullet_text
-    for text in (drake_text, bullet_text):
+    page += drake_text + bullet_text + mesh_text
+    for text in (drake_text, bullet_text, mesh_text):
         if "Not measured" in text:
             print(text.strip())
     (ROOT / "docs/peers.md").write_text(page, encoding="utf-8")
