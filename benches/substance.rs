@@ -20,7 +20,9 @@ fn main() {
         let link = world.create_link(floor, LinkDesc { kind: Kind::Fixed, ..LinkDesc::default() }).unwrap();
         let shape = Shape::Plane { point: Vec3::new(0.0, 0.0, -0.05), normal: Vec3::z() };
         world.create_skeleton(link, SkeletonDesc { shape, thickness: 0.05, ..SkeletonDesc::default() }).unwrap();
-        let body = world.create_body(BodyDesc { stiffness_scale: 2e4, friction: 0.6, ..BodyDesc::default() }).unwrap();
+        let body = world
+            .create_body(BodyDesc { stiffness_scale: 2e4, friction: 0.6, dissipation: 2.0, ..BodyDesc::default() })
+            .unwrap();
         // As the description says: cohesion, damping; the rest as it comes.
         let cohesion = 50.0 * particle_mass * 9.81 * spacing;
         world

@@ -186,7 +186,9 @@ fn a_lump_falls_on_the_ground_and_comes_to_rest_with_its_volume() {
 
 /// Potential energy of particles [J]: model.md, "Particles", written again.
 fn potential(desc: &SubstanceDesc, points: &[Vec3]) -> f64 {
-    let (r0, cut) = (desc.spacing, 1.6 * desc.spacing);
+    // At rest at the spacing: r0 is a little less.
+    let r0 = desc.spacing / 1.024_156_065_016_251;
+    let cut = 1.6 * r0;
     let bare = |r: f64| desc.cohesion * ((r0 / r).powi(8) / 8.0 - (r0 / r).powi(4) / 4.0);
     let shift = desc.cohesion / cut * ((r0 / cut).powi(8) - (r0 / cut).powi(4));
     let mut energy = 0.0;
@@ -599,9 +601,9 @@ fn nine_particles_are_grabbed_by_pliers_and_released() {
         let t = step as f64 / 60.0;
         for (jaw, side) in jaws.into_iter().zip([-1.0, 1.0]) {
             let closing = if t < 1.0 {
-                -0.15 * side
+                -0.22 * side
             } else if (3.0..4.0).contains(&t) {
-                0.15 * side
+                0.22 * side
             } else {
                 0.0
             };

@@ -1113,9 +1113,9 @@ mod tests {
             let mut spans = Spans::default();
             super::spans(&skeletons, &all, &cubes, &mut spans);
             let slack = 1e-9 * skeletons.iter().map(|k| k.profile.peak() + SIZE * k.profile.lipschitz()).sum::<f64>();
-            for k in 0..8 {
+            for (k, cube) in centers.iter().enumerate() {
                 for place in &places {
-                    let p = Vec3::from(centers[k]) + place * half;
+                    let p = Vec3::from(*cube) + place * half;
                     let fields: Vec<f64> = skeletons.iter().map(|s| s.value(&p)).collect();
                     let (sum, largest) = (fields.iter().sum::<f64>(), fields.iter().fold(0.0, |x, y| f64::max(x, *y)));
                     prop_assert!(spans.least[k] <= sum + slack && sum <= spans.most[k] + slack);

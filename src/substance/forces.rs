@@ -2,15 +2,18 @@
 //! \[97, eq. (27)\] (docs/model.md, "Particles").
 //!
 //! `F(r) = γ/r ((r_0/r)^8 - (r_0/r)^4)` repels below `r_0` and attracts above. Cut at `r_c = 1.6 r_0`, with
-//! `F(r) - F(r_c)`, particles at rest are `r_0` apart (nearly: the force is zero a little above) however many they are,
-//! and each has few neighbours. Nearer than [`HARDEST`] the force goes on as a line, so that it is finite.
+//! `F(r) - F(r_c)`, particles at rest are equally far apart however many they are, `1.024 r_0`, which is the spacing, and
+//! each has few neighbours. Nearer than [`HARDEST`] the force goes on as a line, so that it is finite.
 
 use crate::math::Vec3;
 
 /// Distance beyond which there is no force, over the spacing.
-pub const CUT: f64 = 1.6;
+pub const CUT: f64 = 1.6 / REST;
 /// Distance below which the stiffness grows no more, over the spacing.
 pub const HARDEST: f64 = 0.7;
+
+/// Where the shifted force is zero, over `r_0`: particles are to rest at the spacing.
+const REST: f64 = 1.024_156_065_016_251;
 
 /// Attraction and repulsion of one substance.
 #[derive(Clone, Copy, Debug, Default)]
@@ -36,10 +39,11 @@ fn bare(spacing: f64, cohesion: f64, r: f64) -> (f64, f64) {
 impl Law {
     /// The law of a substance, with its stiffness bounded by `most` \[N/m\].
     pub fn new(spacing: f64, cohesion: f64, most: f64) -> Self {
+        let spacing = spacing / REST;
         // What cannot be followed in time is made softer, as little as needed.
         let rest = 4.0 * cohesion / (spacing * spacing);
         let cohesion = if rest > most { cohesion * most / rest } else { cohesion };
-        let (shift, _) = bare(spacing, cohesion, CUT * spacing);
+        let (shift, _) = bare(spacing, cohesion, CUT * REST * spacing);
         let stiffness = |r: f64| bare(spacing, cohesion, r).1;
         let (mut hard, mut soft) = (HARDEST * spacing, spacing);
         if stiffness(hard) > most {
@@ -54,7 +58,7 @@ impl Law {
             hard = soft;
         }
         let (force, hard_stiffness) = bare(spacing, cohesion, hard);
-        Self { spacing, cohesion, shift, cut: CUT * spacing, hard, hard_force: force - shift, hard_stiffness }
+        Self { spacing, cohesion, shift, cut: CUT * REST * spacing, hard, hard_force: force - shift, hard_stiffness }
     }
 
     /// Repulsion at a distance below the cut \[N\].

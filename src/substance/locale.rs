@@ -146,28 +146,34 @@ fn sums<const GRADIENT: bool>(blocks: &[Block], p: &Vec3) -> [f64; 4] {
 }
 
 impl Block {
-    /// Each one's field, and its gradient if asked for.
+    /// Each one's field, and its gradient if asked for. One loop over all of it becomes vector instructions; operations on
+    /// whole [`Lanes`] become them in part only.
     #[inline(always)]
     fn fields<const GRADIENT: bool>(&self, p: &Vec3) -> [Lanes<WIDTH>; 4] {
-        let (zero, one) = (Lanes::splat(0.0), Lanes::splat(1.0));
-        let (x, y) = (Lanes::splat(p.x) - self.place[0], Lanes::splat(p.y) - self.place[1]);
-        let z = Lanes::splat(p.z) - self.place[2];
-        let distance = (x * x + y * y + z * z).sqrt();
-        let depth = self.thickness - distance;
-        // Outside, a cubic in u, which runs from 1 on the surface to 0 where the field ends; inside, a line.
-        let u = (one + depth * self.inverse_width).max(zero);
-        let outer = u * u * (self.square + self.cubic * u);
-        let inner = self.isovalue + self.stiffness * depth;
-        let value = depth.where_greater(zero, inner, outer);
-        if !GRADIENT {
-            return [value, zero, zero, zero];
+        let mut out = [ZERO; 4];
+        for lane in 0..WIDTH {
+            let [x, y, z] = [p.x - self.place[0].0[lane], p.y - self.place[1].0[lane], p.z - self.place[2].0[lane]];
+            let distance = (x * x + y * y + z * z).sqrt();
+            let depth = self.thickness.0[lane] - distance;
+            // Outside, a cubic in u, which runs from 1 on the surface to 0 where the field ends; inside, a line.
+            let u = 1.0 + depth * self.inverse_width.0[lane];
+            let u = if u > 0.0 { u } else { 0.0 };
+            let outer = u * u * (self.square.0[lane] + self.cubic.0[lane] * u);
+            let inner = self.isovalue.0[lane] + self.stiffness.0[lane] * depth;
+            let inside = depth > 0.0;
+            out[0].0[lane] = if inside { inner } else { outer };
+            if GRADIENT {
+                let outer_slope =
+                    u * (2.0 * self.square.0[lane] + 3.0 * self.cubic.0[lane] * u) * self.inverse_width.0[lane];
+                let slope = if inside { self.stiffness.0[lane] } else { outer_slope };
+                // At the particle itself the direction is lost, and with it nothing that counts.
+                let over = -slope / if distance > 1e-150 { distance } else { 1e-150 };
+                out[1].0[lane] = over * x;
+                out[2].0[lane] = over * y;
+                out[3].0[lane] = over * z;
+            }
         }
-        let two = Lanes::splat(2.0);
-        let outer_slope = u * (two * self.square + Lanes::splat(3.0) * self.cubic * u) * self.inverse_width;
-        let slope = depth.where_greater(zero, self.stiffness, outer_slope);
-        // At the particle itself the direction is lost, and with it nothing that counts.
-        let over = zero - slope / distance.max(Lanes::splat(1e-150));
-        [value, over * x, over * y, over * z]
+        out
     }
 }
 

@@ -1,6 +1,6 @@
 //! One step of all substances of a world: sub-steps of particles, and of what they touch.
 //!
-//! Velocity Verlet with forces of [`forces`](super::forces) and of [`contact`](super::contact); friction as exact impulses
+//! Velocity Verlet with forces of [`forces`](super::forces) and of [`contact`]; friction as exact impulses
 //! after each sub-step. A contact is integrated when it has moved by a few percent of the thickness since it was last, and
 //! is a spring in between. Links that can move go along in the sub-steps, with all that is known to act on them; what they
 //! got is handed to the step's response, which then solves everything else.
@@ -49,6 +49,8 @@ pub struct Matter {
     pub fusion_threshold: f64,
     /// The field without an offset.
     pub profile: Profile,
+    /// Where two particles of the same field make a solid together: its half way, without offsets \[m\].
+    pub half: f64,
     /// No surface is farther from a particle, without offsets: there [`CROWD`] would have to add up \[m\].
     pub farthest: f64,
     /// Pressure a unit of field \[Pa\].
@@ -269,7 +271,7 @@ impl System {
         for matter in &self.swarm.matters {
             let most = matter.mass * (2.0 * phase / least).powi(2);
             let law = Law::new(matter.spacing, matter.cohesion, most);
-            self.overloaded |= law.stiffness(matter.spacing) < 3.9 * matter.cohesion / matter.spacing.powi(2);
+            self.overloaded |= law.stiffness(0.5 * matter.spacing) < 3.9 * matter.cohesion / matter.spacing.powi(2);
             self.laws.push(law);
         }
         self.build(motions);

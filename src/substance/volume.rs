@@ -49,24 +49,32 @@ struct Rivals {
 /// Eight whose borders no ray meets.
 const NOBODY: Rivals = Rivals { q: [Lanes([0.0; WIDTH]); 3], first: Lanes([1.0; WIDTH]), excess: Lanes([0.0; WIDTH]) };
 
-/// The nearest border that a ray meets before `end`, and whose it is.
+/// The nearest border that a ray meets before `end`, and whose it is. Borders are fractions, compared without dividing.
 #[inline(always)]
 fn nearest(rivals: &[Rivals], u: &Vec3, end: f64) -> (f64, Option<usize>) {
-    let (x, y, z) = (Lanes::splat(u.x), Lanes::splat(u.y), Lanes::splat(u.z));
-    let (none, mut block) = (Lanes::splat(f64::INFINITY), Lanes::splat(0.0));
-    let (mut ends, mut blocks) = (Lanes::splat(end), Lanes::splat(-1.0));
+    let (mut firsts, mut slopes, mut blocks) = ([end; WIDTH], [1.0; WIDTH], [-1.0; WIDTH]);
+    let mut block = 0.0;
     for rivals in rivals {
         compiler_fence(Ordering::SeqCst);
-        let slope = x * rivals.q[0] + y * rivals.q[1] + z * rivals.q[2] + rivals.excess;
-        let border = slope.where_greater(Lanes::splat(0.0), rivals.first / slope, none);
-        blocks = border.where_less(ends, block, blocks);
-        ends = border.where_less(ends, border, ends);
-        block = block + Lanes::splat(1.0);
+        for lane in 0..WIDTH {
+            let first = rivals.first.0[lane];
+            let slope = u.x * rivals.q[0].0[lane]
+                + u.y * rivals.q[1].0[lane]
+                + u.z * rivals.q[2].0[lane]
+                + rivals.excess.0[lane];
+            let ahead = if slope > 0.0 { slope } else { 0.0 };
+            let is_nearer = first * slopes[lane] < firsts[lane] * ahead;
+            firsts[lane] = if is_nearer { first } else { firsts[lane] };
+            slopes[lane] = if is_nearer { ahead } else { slopes[lane] };
+            blocks[lane] = if is_nearer { block } else { blocks[lane] };
+        }
+        block += 1.0;
     }
     let mut best = (end, None);
     for lane in 0..WIDTH {
-        if blocks.0[lane] >= 0.0 && ends.0[lane] < best.0 {
-            best = (ends.0[lane], Some(blocks.0[lane] as usize * WIDTH + lane));
+        let border = firsts[lane] / slopes[lane];
+        if blocks[lane] >= 0.0 && border < best.0 {
+            best = (border, Some(blocks[lane] as usize * WIDTH + lane));
         }
     }
     (best.0.max(0.0), best.1)
@@ -137,7 +145,7 @@ pub fn measure(swarm: &Swarm, index: usize, directions: &[Vec3], locale: &mut Lo
         owners.push((*j, weight));
         // The neck of two may be thinner than what rays see.
         let reach = first / (square.sqrt() + excess);
-        if first <= 0.0 || 2.0 * matter.profile.value_slope(reach - own_offset).0 >= isovalue {
+        if first <= 0.0 || reach - own_offset <= matter.half {
             share.join(*j);
         }
     }
@@ -151,8 +159,7 @@ pub fn measure(swarm: &Swarm, index: usize, directions: &[Vec3], locale: &mut Lo
             continue;
         };
         // Both have the same field at the border, and most often these two are enough.
-        let two = 2.0 * matter.profile.value_slope(near - own_offset).0;
-        let is_solid = near <= thickness || two >= isovalue || locale.value(&(center + u * near)) >= isovalue;
+        let is_solid = near - own_offset <= matter.half || locale.value(&(center + u * near)) >= isovalue;
         if is_solid {
             share.join(other);
         }

@@ -421,6 +421,7 @@ impl World {
                 viscosity: desc.viscosity,
                 damping: desc.damping,
                 fusion_threshold: desc.fusion_threshold,
+                half: profile.distance_of_level(0.5 * profile.isovalue),
                 farthest: profile.distance_of_level(profile.isovalue / CROWD),
                 profile,
                 stiffness_scale: body.stiffness_scale,
