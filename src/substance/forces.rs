@@ -127,12 +127,13 @@ mod tests {
     #[test]
     fn the_force_is_the_slope_of_the_energy_and_ends_at_the_cut() {
         let law = Law::new(0.2, 3.0, f64::INFINITY);
-        for r in [0.02, 0.1, 0.139, 0.15, 0.19, 0.2, 0.22, 0.3, 0.319] {
+        for r in [0.02, 0.1, 0.135, 0.15, 0.19, 0.2, 0.22, 0.3, 0.312] {
             let h = 1e-6;
             let slope = (law.energy(r - h) - law.energy(r + h)) / (2.0 * h);
             assert!((slope - law.force(r)).abs() < 1e-5 * law.force(r).abs().max(1.0), "{r}: {slope} {}", law.force(r));
             assert!(law.stiffness(r) >= (law.force(r - h) - law.force(r + h)) / (2.0 * h) * (1.0 - 1e-6));
         }
+        assert!(law.force(0.2).abs() < 1e-12, "at rest at the spacing");
         assert!(law.force(CUT * 0.2).abs() < 1e-12 && law.energy(CUT * 0.2).abs() < 1e-12);
     }
 
