@@ -184,8 +184,12 @@ pub struct Locale {
     own: Group,
     /// Those of one other label, or of all others.
     other: Group,
-    /// Bonds between the two, by places in them.
-    bonds: Vec<(u32, u32, f64)>,
+    /// Bonds between the two, by places in them: for each of the own where its bonds begin, and all.
+    bond_starts: Vec<u32>,
+    bonds: Vec<(u32, f64)>,
+    /// Where each particle is in `other`, for those with the number of this gathering.
+    places: Vec<(u64, u32)>,
+    gathering: u64,
     reach: f64,
     own_values: Vec<f64>,
     other_values: Vec<f64>,
@@ -198,6 +202,7 @@ impl Locale {
         self.own.clear();
         self.other.clear();
         self.bonds.clear();
+        self.bond_starts.clear();
         self.reach = reach;
         let add = |group: &mut Group, j: usize| {
             group.add(j as u32, &swarm.place[j], swarm.offset[j], swarm.matter_of(j));
@@ -221,14 +226,26 @@ impl Locale {
             }
         }
         if bonded && !self.other.indices.is_empty() {
-            for (i, particle) in self.own.indices.iter().enumerate() {
-                for (j, weight) in swarm.bonds_of(*particle as usize) {
-                    if let Some(place) = self.other.indices.iter().position(|other| other == j) {
-                        self.bonds.push((i as u32, place as u32, *weight));
-                    }
+            self.gather_bonds(swarm);
+        }
+    }
+
+    fn gather_bonds(&mut self, swarm: &Swarm) {
+        self.gathering += 1;
+        self.places.resize(self.places.len().max(swarm.place.len()), (0, 0));
+        for (place, particle) in self.other.indices.iter().enumerate() {
+            self.places[*particle as usize] = (self.gathering, place as u32);
+        }
+        for particle in &self.own.indices {
+            self.bond_starts.push(self.bonds.len() as u32);
+            for (other, weight) in swarm.bonds_of(*particle as usize) {
+                let (gathering, place) = self.places[*other as usize];
+                if gathering == self.gathering {
+                    self.bonds.push((place, *weight));
                 }
             }
         }
+        self.bond_starts.push(self.bonds.len() as u32);
     }
 
     /// Whether any bond matters here.
@@ -263,9 +280,12 @@ impl Locale {
         }
         self.own.values(p, &mut self.own_values);
         self.other.values(p, &mut self.other_values);
-        let part =
-            |(i, j, weight): &(u32, u32, f64)| weight * self.own_values[*i as usize] * self.other_values[*j as usize];
-        self.bonds.iter().map(part).sum()
+        let mut sum = 0.0;
+        for (own, bonds) in self.own_values.iter().zip(self.bond_starts.windows(2)).filter(|(own, _)| **own > 0.0) {
+            let bonds = &self.bonds[bonds[0] as usize..bonds[1] as usize];
+            sum += own * bonds.iter().map(|(place, weight)| weight * self.other_values[*place as usize]).sum::<f64>();
+        }
+        sum
     }
 
     /// The field as one sees it from the own label, bonds and all.
