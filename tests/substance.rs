@@ -678,3 +678,35 @@ fn three_substances_under_pin_and_knife_never_mix() {
     assert!(worst.iter().all(|worst| *worst < 0.03));
     assert!(world.pieces(bodies[2]).unwrap().len() > 1, "the knife cuts");
 }
+
+#[test]
+fn lumps_that_are_pressed_together_fuse_without_a_jump_of_volume() {
+    let mut world = world(0.0);
+    let body = world.create_body(BodyDesc { stiffness_scale: 2e4, ..BodyDesc::default() }).unwrap();
+    world.make_substance(body, SubstanceDesc { fusion_threshold: 500.0, ..clay(0.05) }).unwrap();
+    for side in [-1.0, 1.0] {
+        world.fill_substance(body, &ball(Vec3::new(side * 0.16, 0.0, 0.0), 0.14)).unwrap();
+    }
+    let plates =
+        [-1.0, 1.0].map(|side| tool(&mut world, Vec3::new(side * 0.4, 0.0, 0.0), Vec3::new(0.05, 0.3, 0.3), 0.02, 0.3));
+    let (mut last, mut jump, mut worst, mut fused) = (f64::NAN, 0.0_f64, 0.0_f64, None);
+    for step in 0..180 {
+        for (plate, side) in plates.into_iter().zip([-1.0, 1.0]) {
+            drive(&mut world, plate, Vec3::new(if step < 60 { -0.12 * side } else { 0.0 }, 0.0, 0.0));
+        }
+        world.step(1.0 / 60.0).unwrap();
+        let began = world.substance_changes(body).unwrap().iter().any(|change| matches!(change, Change::Fused(_)));
+        if began && fused.is_none() {
+            fused = Some(step);
+        }
+        let error = volume_errors(&world, body)[0];
+        if fused.is_some() {
+            jump = jump.max((error - last).abs());
+        }
+        (last, worst) = (error, worst.max(error.abs()));
+    }
+    let pieces = world.pieces(body).unwrap().len();
+    println!("fuse at {fused:?}, {pieces} piece; volume off by {worst:.4} at most, {jump:.4} from a step to the next");
+    assert!(fused.is_some() && pieces == 1);
+    assert!(jump < 0.03 && worst < 0.03);
+}

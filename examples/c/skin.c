@@ -5,19 +5,10 @@
  */
 #include <isocoat/isocoat.h>
 
+#include "../common/check.h"
 #include "../common/raster.h"
 
 #include <stdio.h>
-
-#define CHECK(call)                                      \
-    do {                                                 \
-        if ((call) != ISOCOAT_OK) {                      \
-            char message[256];                           \
-            isocoat_last_error(message, sizeof message); \
-            fprintf(stderr, "%s: %s\n", #call, message); \
-            return 1;                                    \
-        }                                                \
-    } while (0)
 
 enum { BODIES = 3 };
 static const double THICKNESS = 0.1;

@@ -296,24 +296,8 @@ fn apportion(areas: &[f64], count: usize) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::field::skeleton::tests::{bounded_shapes, vectors};
     use proptest::prelude::*;
-
-    fn vectors(size: f64) -> impl Strategy<Value = Vec3> {
-        (-size..size, -size..size, -size..size).prop_map(|(x, y, z)| Vec3::new(x, y, z))
-    }
-
-    fn bounded_shapes() -> impl Strategy<Value = Shape> {
-        prop_oneof![
-            vectors(1.0).prop_map(Shape::Point),
-            (vectors(1.0), vectors(1.0)).prop_map(|(a, b)| Shape::segment(a, b)),
-            (vectors(1.0), vectors(1.0), vectors(1.0)).prop_map(|(a, b, c)| Shape::triangle(a, b, c)),
-            (vectors(1.0), vectors(1.0), vectors(2.0)).prop_map(|(center, h, r)| Shape::Box {
-                center,
-                half: h.map(|x| 0.01 + x.abs()),
-                axes: *crate::math::rotation_from_vector(&r).to_rotation_matrix().matrix(),
-            }),
-        ]
-    }
 
     /// Steiner's polynomial: volume of the core, its area, the integral of its mean curvature, all about the offset.
     fn steiner(shape: &Shape) -> (f64, f64, f64) {
@@ -340,7 +324,7 @@ mod tests {
     proptest! {
         #[test]
         fn areas_and_volumes_of_offsets_are_exact(
-            shape in bounded_shapes(), thickness in 0.01..2.0f64, r in 0.01..3.0f64, count in 4usize..300,
+            shape in bounded_shapes(0.01), thickness in 0.01..2.0f64, r in 0.01..3.0f64, count in 4usize..300,
         ) {
             let rays = rays_of(&shape, thickness, count);
             let (core, flat, curved) = steiner(&shape);
@@ -356,7 +340,7 @@ mod tests {
 
         #[test]
         fn distance_to_the_skeleton_grows_by_the_length_of_the_ray(
-            shape in bounded_shapes(), thickness in 0.01..2.0f64, r in 0.0..3.0f64, count in 4usize..300,
+            shape in bounded_shapes(0.01), thickness in 0.01..2.0f64, r in 0.0..3.0f64, count in 4usize..300,
         ) {
             for ray in rays_of(&shape, thickness, count) {
                 prop_assert!((ray.direction.norm() - 1.0).abs() < 1e-14);

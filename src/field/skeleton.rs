@@ -352,21 +352,28 @@ pub(crate) mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn vectors(size: f64) -> impl Strategy<Value = Vec3> {
+    pub fn vectors(size: f64) -> impl Strategy<Value = Vec3> {
         (-size..size, -size..size, -size..size).prop_map(|(x, y, z)| Vec3::new(x, y, z))
     }
 
-    pub fn shapes() -> impl Strategy<Value = Shape> {
+    /// All but planes; half sides of boxes are longer than `least`.
+    pub fn bounded_shapes(least: f64) -> impl Strategy<Value = Shape> {
         prop_oneof![
             vectors(1.0).prop_map(Shape::Point),
             (vectors(1.0), vectors(1.0)).prop_map(|(a, b)| Shape::segment(a, b)),
             (vectors(1.0), vectors(1.0), vectors(1.0)).prop_map(|(a, b, c)| Shape::triangle(a, b, c)),
-            (vectors(1.0), vectors(1.0), vectors(2.0)).prop_map(|(center, h, r)| Shape::Box {
+            (vectors(1.0), vectors(1.0), vectors(2.0)).prop_map(move |(center, h, r)| Shape::Box {
                 center,
-                half: h.map(|x| 0.1 + x.abs()),
+                half: h.map(|x| least + x.abs()),
                 axes: *crate::math::rotation_from_vector(&r).to_rotation_matrix().matrix(),
             }),
-            (vectors(1.0), vectors(1.0)).prop_filter_map("no normal", |(p, n)| Shape::plane(p, n).ok()),
+        ]
+    }
+
+    pub fn shapes() -> impl Strategy<Value = Shape> {
+        prop_oneof![
+            4 => bounded_shapes(0.1),
+            1 => (vectors(1.0), vectors(1.0)).prop_filter_map("no normal", |(p, n)| Shape::plane(p, n).ok()),
         ]
     }
 

@@ -51,6 +51,11 @@ pub struct Stiffness {
 }
 
 impl Stiffness {
+    /// Pressure a unit of `σ` \[Pa\].
+    pub fn joint(&self) -> f64 {
+        self.weights().2
+    }
+
     /// `w_a`, `w_b` and `K`.
     fn weights(&self) -> (f64, f64, f64) {
         if self.other.is_infinite() {

@@ -61,29 +61,19 @@ impl Law {
         Self { spacing, cohesion, shift, cut: CUT * REST * spacing, hard, hard_force: force - shift, hard_stiffness }
     }
 
-    /// Repulsion at a distance below the cut \[N\].
-    pub fn force(&self, r: f64) -> f64 {
-        if r < self.hard {
-            self.hard_force + self.hard_stiffness * (self.hard - r)
-        } else {
-            bare(self.spacing, self.cohesion, r).0 - self.shift
-        }
+    /// The strength that it has: less than asked for where that could not be followed \[J\].
+    pub fn cohesion(&self) -> f64 {
+        self.cohesion
     }
 
-    /// Both at once.
-    pub fn force_stiffness(&self, r: f64) -> (f64, f64) {
+    /// Repulsion at a distance below the cut \[N\], and the most that its stiffness is up to there \[N/m\].
+    pub fn push(&self, r: f64) -> (f64, f64) {
         if r < self.hard {
             return (self.hard_force + self.hard_stiffness * (self.hard - r), self.hard_stiffness);
         }
         let (force, stiffness) = bare(self.spacing, self.cohesion, r);
-        // The most up to there.
         let rest = 4.0 * self.cohesion / (self.spacing * self.spacing);
         (force - self.shift, if r < self.spacing { stiffness } else { rest })
-    }
-
-    /// Stiffness at a distance \[N/m\]: the most up to there.
-    pub fn stiffness(&self, r: f64) -> f64 {
-        if r < self.hard { self.hard_stiffness } else { bare(self.spacing, self.cohesion, r.min(self.spacing)).1 }
     }
 
     /// Potential energy of a pair \[J\]: zero at the cut.
@@ -130,11 +120,15 @@ mod tests {
         for r in [0.02, 0.1, 0.135, 0.15, 0.19, 0.2, 0.22, 0.3, 0.312] {
             let h = 1e-6;
             let slope = (law.energy(r - h) - law.energy(r + h)) / (2.0 * h);
-            assert!((slope - law.force(r)).abs() < 1e-5 * law.force(r).abs().max(1.0), "{r}: {slope} {}", law.force(r));
-            assert!(law.stiffness(r) >= (law.force(r - h) - law.force(r + h)) / (2.0 * h) * (1.0 - 1e-6));
+            assert!(
+                (slope - law.push(r).0).abs() < 1e-5 * law.push(r).0.abs().max(1.0),
+                "{r}: {slope} {}",
+                law.push(r).0
+            );
+            assert!(law.push(r).1 >= (law.push(r - h).0 - law.push(r + h).0) / (2.0 * h) * (1.0 - 1e-6));
         }
-        assert!(law.force(0.2).abs() < 1e-12, "at rest at the spacing");
-        assert!(law.force(CUT * 0.2).abs() < 1e-12 && law.energy(CUT * 0.2).abs() < 1e-12);
+        assert!(law.push(0.2).0.abs() < 1e-12, "at rest at the spacing");
+        assert!(law.push(CUT * 0.2).0.abs() < 1e-12 && law.energy(CUT * 0.2).abs() < 1e-12);
     }
 
     #[test]
@@ -143,7 +137,7 @@ mod tests {
             let law = Law::new(0.2, 3.0, most);
             for k in 1..400 {
                 let (r, h) = (k as f64 * 8e-4, 1e-7);
-                let stiffness = (law.force(r - h) - law.force(r + h)) / (2.0 * h);
+                let stiffness = (law.push(r - h).0 - law.push(r + h).0) / (2.0 * h);
                 assert!(stiffness <= most * (1.0 + 1e-4), "{most} at {r}: {stiffness}");
             }
         }

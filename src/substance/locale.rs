@@ -11,7 +11,7 @@
 
 use std::sync::atomic::{Ordering, compiler_fence};
 
-use super::system::{Matter, Swarm};
+use super::swarm::{Matter, Swarm};
 use crate::field::lanes::Lanes;
 use crate::math::Vec3;
 

@@ -12,14 +12,18 @@
 //! | [`volume`] | what each particle has of the coat; which particles hang together; volume control |
 //! | [`pieces`] | splitting, fusing, bonds that come and go |
 //! | [`contact`] | pressure on the coat of a particle: from other bodies, from other pieces |
+//! | [`load`] | who presses on a particle: integrated now and then, a spring in between |
+//! | [`swarm`] | all particles of a world side by side |
 //! | [`system`] | one step of all substances of a world, in sub-steps |
 
 pub mod contact;
 pub mod fill;
 pub mod forces;
+pub mod load;
 pub mod locale;
 pub mod neighbours;
 pub mod pieces;
+pub mod swarm;
 pub mod system;
 pub mod volume;
 

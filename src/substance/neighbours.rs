@@ -8,7 +8,8 @@ const CELLS: i64 = 1 << 21;
 /// For each particle, the others within a reach.
 #[derive(Debug, Default)]
 pub struct Neighbours {
-    starts: Vec<u32>,
+    /// For each particle, where its list begins and ends: lists lie in the order of cells.
+    ranges: Vec<(u32, u32)>,
     lists: Vec<u32>,
     /// Cell and particle, in order.
     cells: Vec<(u64, u32)>,
@@ -22,7 +23,7 @@ fn key(cell: [i64; 3]) -> u64 {
 impl Neighbours {
     /// Finds all pairs up to `reach` apart.
     pub fn find(&mut self, points: &[Vec3], reach: f64) {
-        let Self { starts, lists, cells } = self;
+        let Self { ranges, lists, cells } = self;
         let low = points.iter().fold(Vec3::repeat(f64::INFINITY), |low, p| low.inf(p));
         let cell_of = |p: &Vec3| {
             let at = (p - low) / reach;
@@ -31,11 +32,10 @@ impl Neighbours {
         cells.clear();
         cells.extend(points.iter().enumerate().map(|(index, p)| (key(cell_of(p)), index as u32)));
         cells.sort_unstable();
-        starts.clear();
-        starts.resize(points.len() + 1, 0);
+        ranges.clear();
+        ranges.resize(points.len(), (0, 0));
         lists.clear();
-        // The particles of a cell share their nine rows of cells; lists are made in the order of cells, then put in order.
-        let mut made: Vec<(u32, u32, u32)> = Vec::with_capacity(points.len());
+        // The particles of a cell share their nine rows of cells.
         let mut rows = [(0, 0); 9];
         let mut first = 0;
         while first < cells.len() {
@@ -62,31 +62,16 @@ impl Neighbours {
                         }
                     }
                 }
-                made.push((*index, begin, lists.len() as u32));
+                ranges[*index as usize] = (begin, lists.len() as u32);
             }
             first = last;
         }
-        // Lists lie in the order of cells: that of the particles is found by their starts alone.
-        self.places(made);
-    }
-
-    fn places(&mut self, made: Vec<(u32, u32, u32)>) {
-        let mut sorted = Vec::with_capacity(self.lists.len());
-        let mut by_index = made;
-        by_index.sort_unstable();
-        for (index, begin, end) in by_index {
-            self.starts[index as usize] = sorted.len() as u32;
-            sorted.extend_from_slice(&self.lists[begin as usize..end as usize]);
-        }
-        if let Some(last) = self.starts.last_mut() {
-            *last = sorted.len() as u32;
-        }
-        self.lists = sorted;
     }
 
     /// The others near a particle.
     pub fn of(&self, index: usize) -> &[u32] {
-        &self.lists[self.starts[index] as usize..self.starts[index + 1] as usize]
+        let (begin, end) = self.ranges[index];
+        &self.lists[begin as usize..end as usize]
     }
 }
 

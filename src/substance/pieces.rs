@@ -6,6 +6,8 @@
 //! substance's threshold, bonds grow between those who have a field there. When all who could blend do, the two labels
 //! become one. Memory is that of the particles, and of bonds along the seams.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use super::{Bond, Change, ParticleId, Substance};
 
 /// Farthest that a bond goes in a step: the surface then moves by less than a hundredth of the thickness.
@@ -55,6 +57,16 @@ impl Substance {
         self.bonds.binary_search_by_key(&pair, |bond| bond.pair)
     }
 
+    /// Adds bonds that are not there yet; each counts once.
+    fn add_bonds(&mut self, fresh: Vec<Bond>) {
+        if fresh.is_empty() {
+            return;
+        }
+        self.bonds.extend(fresh);
+        self.bonds.sort_unstable_by_key(|bond| bond.pair);
+        self.bonds.dedup_by_key(|bond| bond.pair);
+    }
+
     fn label_of(&self, place: u32) -> u32 {
         self.particles[place as usize].label
     }
@@ -84,6 +96,7 @@ impl Substance {
     }
 
     fn fuse(&mut self, pressed: &[[u32; 2]]) {
+        let mut fresh = Vec::new();
         for pair in pressed {
             if self.label_of(pair[0]) == self.label_of(pair[1]) {
                 continue;
@@ -91,16 +104,17 @@ impl Substance {
             match self.bond_at(*pair) {
                 Ok(at) if self.bonds[at].holds => continue,
                 Ok(at) => self.bonds[at].holds = true,
-                Err(at) => self.bonds.insert(at, Bond { pair: *pair, progress: 0.0, holds: true }),
+                Err(_) => fresh.push(Bond { pair: *pair, progress: 0.0, holds: true }),
             }
             self.changes.push(Change::Fused(pair.map(|end| self.name_of(end))));
         }
+        self.add_bonds(fresh);
     }
 
     /// Two between which nothing is pressed, but which both blend fully with others of the other label, are within what has
     /// become one: they blend too.
     fn fill_seams(&mut self, reaching: &impl Fn(u32) -> Vec<u32>) {
-        let blended: std::collections::BTreeSet<(u32, u32)> = self
+        let blended: BTreeSet<(u32, u32)> = self
             .bonds
             .iter()
             .filter(|bond| bond.holds && bond.progress >= 1.0)
@@ -109,17 +123,19 @@ impl Substance {
             .collect();
         let mut ends: Vec<u32> = blended.iter().map(|(own, _)| *own).collect();
         ends.dedup();
+        let mut fresh = Vec::new();
         for own in &ends {
             for other in reaching(*own).into_iter().filter(|other| other > own) {
                 let to = self.label_of(other);
                 let within = to != self.label_of(*own)
                     && blended.contains(&(*own, to))
                     && blended.contains(&(other, self.label_of(*own)));
-                if within && let Err(at) = self.bond_at([*own, other]) {
-                    self.bonds.insert(at, Bond { pair: [*own, other], progress: 0.0, holds: true });
+                if within && self.bond_at([*own, other]).is_err() {
+                    fresh.push(Bond { pair: [*own, other], progress: 0.0, holds: true });
                 }
             }
         }
+        self.add_bonds(fresh);
     }
 
     /// Parts of a label that hang together no more: all but the largest get labels of their own.
@@ -140,7 +156,7 @@ impl Substance {
             sizes[alike.find(place) as usize] += 1;
         }
         // For each label, the part that keeps it.
-        let mut keeps: std::collections::BTreeMap<u32, u32> = std::collections::BTreeMap::new();
+        let mut keeps: BTreeMap<u32, u32> = BTreeMap::new();
         let mut parts = 0;
         for place in (0..count as u32).filter(|place| sizes[*place as usize] > 0) {
             parts += 1;
@@ -153,7 +169,7 @@ impl Substance {
             return;
         }
         let old: Vec<u32> = self.particles.iter().map(|particle| particle.label).collect();
-        let mut fresh: std::collections::BTreeMap<u32, (u32, Vec<ParticleId>)> = std::collections::BTreeMap::new();
+        let mut fresh: BTreeMap<u32, (u32, Vec<ParticleId>)> = BTreeMap::new();
         for place in 0..count as u32 {
             let part = alike.find(place);
             if keeps[&old[place as usize]] == part {
@@ -169,6 +185,7 @@ impl Substance {
         }
         self.share_out_volume(&old);
         // What blended goes on blending for a while.
+        let mut bonds = Vec::new();
         for place in 0..count as u32 {
             if self.label_of(place) == old[place as usize] {
                 continue;
@@ -177,18 +194,19 @@ impl Substance {
                 let pair = [place.min(other), place.max(other)];
                 if old[other as usize] == old[place as usize]
                     && self.label_of(other) != self.label_of(place)
-                    && let Err(at) = self.bond_at(pair)
+                    && self.bond_at(pair).is_err()
                 {
-                    self.bonds.insert(at, Bond { pair, progress: 1.0, holds: false });
+                    bonds.push(Bond { pair, progress: 1.0, holds: false });
                 }
             }
         }
+        self.add_bonds(bonds);
         self.changes.extend(fresh.into_values().map(|(_, members)| Change::Split(members)));
     }
 
     /// Each part of what has come apart aims at the volume that it came off with, all of them at that of the whole.
     fn share_out_volume(&mut self, old: &[u32]) {
-        let mut sums: std::collections::BTreeMap<u32, (f64, f64)> = std::collections::BTreeMap::new();
+        let mut sums: BTreeMap<u32, (f64, f64)> = BTreeMap::new();
         let split = self.particles.iter().zip(old).filter(|(particle, old)| particle.label != **old);
         sums.extend(split.map(|(_, old)| (*old, (0.0, 0.0))));
         for (particle, old) in self.particles.iter().zip(old) {
@@ -213,7 +231,7 @@ impl Substance {
             let [a, b] = pair.map(|end| self.label_of(end));
             [a.min(b), a.max(b)]
         };
-        let held: std::collections::BTreeSet<[u32; 2]> = joined.iter().map(labels).collect();
+        let held: BTreeSet<[u32; 2]> = joined.iter().map(labels).collect();
         // Those that have just begun have had no time to join.
         let lost = |bond: &Bond| bond.holds && bond.progress >= 1.0 && !held.contains(&labels(&bond.pair));
         let lost: Vec<usize> = (0..self.bonds.len()).filter(|at| lost(&self.bonds[*at])).collect();
@@ -223,7 +241,7 @@ impl Substance {
     /// Labels between which every pair that could blend does so fully become one.
     fn merge(&mut self, reaching: &impl Fn(u32) -> Vec<u32>) {
         let full = |bond: &Bond| bond.holds && bond.progress >= 1.0;
-        let mut ready: std::collections::BTreeMap<[u32; 2], bool> = std::collections::BTreeMap::new();
+        let mut ready: BTreeMap<[u32; 2], bool> = BTreeMap::new();
         for bond in &self.bonds {
             let [a, b] = bond.pair.map(|end| self.label_of(end));
             *ready.entry([a.min(b), a.max(b)]).or_insert(true) &= full(bond);

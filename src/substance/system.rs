@@ -1,186 +1,27 @@
 //! One step of all substances of a world: sub-steps of particles, and of what they touch.
 //!
-//! Velocity Verlet with forces of [`forces`](super::forces) and of [`contact`]; friction as exact impulses
+//! Velocity Verlet with forces of [`forces`](super::forces) and of [`contact`](super::contact); friction as exact impulses
 //! after each sub-step. A contact is integrated when it has moved by a few percent of the thickness since it was last, and
 //! is a spring in between. Links that can move go along in the sub-steps, with all that is known to act on them; what they
 //! got is handed to the step's response, which then solves everything else.
 
-use std::sync::Arc;
-
-use super::contact::{self, CLOSEST, Opposite, Press, Stiffness};
+use super::contact::Press;
 use super::forces::{CUT, Law, braked, direction};
+use super::load::{Load, Obstacle, Other};
 use super::locale::Locale;
-use super::neighbours::Neighbours;
+use super::swarm::{SKIN, Swarm};
+use super::volume::Share;
 use crate::base::Motion;
-use crate::contact::pair::Side;
 use crate::contact::press::Material;
 use crate::field::skeleton::closest_points;
-use crate::field::{Placed, Profile, Shape};
+use crate::field::{Placed, Shape};
 use crate::math::{Vec3, Wrench};
 use crate::team::Team;
 
-/// Motion of a contact after which it is integrated again, over the thickness.
-const STALE: f64 = 0.05;
-/// How much farther than needed neighbours are looked for, over the radius: they are found again after half as much.
-const SKIN: f64 = 0.2;
 /// Farthest that anything may move in a sub-step, over the thickness.
 const STRIDE: f64 = 0.25;
-/// Most particles of which each has the same part of the field somewhere on the surface.
-pub const CROWD: f64 = 8.0;
 /// Contacts or particles that a worker takes at a time.
 const BLOCK: usize = 8;
-
-/// What the particles of one substance have in common.
-#[derive(Clone, Debug)]
-pub struct Matter {
-    /// Slot of the body.
-    pub body: u32,
-    /// Distance at rest \[m\].
-    pub spacing: f64,
-    /// Of one particle \[kg\].
-    pub mass: f64,
-    /// `γ` \[J\].
-    pub cohesion: f64,
-    /// `μ` \[kg/m\].
-    pub viscosity: f64,
-    /// Damping of a pair at rest over the critical one.
-    pub damping: f64,
-    /// Pressure of fusion \[Pa\].
-    pub fusion_threshold: f64,
-    /// The field without an offset.
-    pub profile: Profile,
-    /// Where two particles of the same field make a solid together: its half way, without offsets \[m\].
-    pub half: f64,
-    /// No surface is farther from a particle, without offsets: there [`CROWD`] would have to add up \[m\].
-    pub farthest: f64,
-    /// Pressure a unit of field \[Pa\].
-    pub stiffness_scale: f64,
-    /// Between its pieces.
-    pub material: Material,
-    /// Seeds.
-    pub directions: Arc<[Vec3]>,
-}
-
-/// All particles of all substances, as columns; in a frame with the world's axes near them.
-#[derive(Debug, Default)]
-pub struct Swarm {
-    /// Origin of the frame in the world \[m\].
-    pub origin: Vec3,
-    /// Places \[m\].
-    pub place: Vec<Vec3>,
-    /// Velocities \[m/s\].
-    pub velocity: Vec<Vec3>,
-    /// Accelerations from outside \[m/s²\].
-    pub pull: Vec<Vec3>,
-    /// Offsets \[m\].
-    pub offset: Vec<f64>,
-    /// Labels, different for every substance.
-    pub label: Vec<u32>,
-    /// Which matter.
-    pub kind: Vec<u16>,
-    /// Who is near.
-    pub near: Neighbours,
-    /// The substances.
-    pub matters: Vec<Matter>,
-    /// Largest radius of influence, offsets in it \[m\].
-    pub widest: f64,
-    /// Bonds of each particle: where its own begin, and the others with weights.
-    pub bond_starts: Vec<u32>,
-    /// See there.
-    pub bond_lists: Vec<(u32, f64)>,
-}
-
-impl Swarm {
-    /// What a particle is made of.
-    pub fn matter_of(&self, index: usize) -> &Matter {
-        &self.matters[self.kind[index] as usize]
-    }
-
-    /// Those of other labels that a particle blends with, and how much.
-    pub fn bonds_of(&self, index: usize) -> &[(u32, f64)] {
-        if self.bond_lists.is_empty() {
-            return &[];
-        }
-        &self.bond_lists[self.bond_starts[index] as usize..self.bond_starts[index + 1] as usize]
-    }
-
-    /// Whether a particle has any bond.
-    pub fn is_bonded(&self, index: usize) -> bool {
-        !self.bonds_of(index).is_empty()
-    }
-
-    /// How far two particles of different labels blend.
-    pub fn bond(&self, a: usize, b: usize) -> f64 {
-        self.bonds_of(a).iter().find(|(other, _)| *other as usize == b).map_or(0.0, |(_, weight)| *weight)
-    }
-
-    /// Sets the bonds, from pairs with weights.
-    pub fn set_bonds(&mut self, pairs: &[([u32; 2], f64)]) {
-        self.bond_starts.clear();
-        self.bond_lists.clear();
-        if pairs.is_empty() {
-            return;
-        }
-        let mut sided: Vec<(u32, u32, f64)> =
-            pairs.iter().flat_map(|([a, b], w)| [(*a, *b, *w), (*b, *a, *w)]).collect();
-        sided.sort_unstable_by_key(|(a, b, _)| (*a, *b));
-        self.bond_starts.resize(self.place.len() + 1, 0);
-        for (a, ..) in &sided {
-            self.bond_starts[*a as usize + 1] += 1;
-        }
-        for index in 1..self.bond_starts.len() {
-            self.bond_starts[index] += self.bond_starts[index - 1];
-        }
-        self.bond_lists.extend(sided.into_iter().map(|(_, b, w)| (b, w)));
-    }
-
-    /// Finds who is near whom: all whose fields reach where the surface near a particle can be, and a little farther.
-    pub fn find_neighbours(&mut self) {
-        let offset = self.offset.iter().copied().fold(0.0, f64::max);
-        let radius = self.matters.iter().map(|matter| matter.profile.radius).fold(0.0, f64::max);
-        self.widest = radius + offset;
-        let farthest = self.matters.iter().map(|matter| matter.farthest).fold(0.0, f64::max);
-        let reach = self.widest + offset + farthest;
-        self.near.find(&self.place, reach + SKIN * radius);
-    }
-}
-
-/// A coat that particles may meet.
-#[derive(Debug, Default)]
-pub struct Obstacle {
-    /// Its skeletons that are near.
-    pub side: Side,
-    /// For each matter, what the two make of their surfaces; none where they do not touch.
-    pub materials: Vec<Option<Material>>,
-}
-
-/// Who presses on a particle.
-#[derive(Clone, Debug)]
-enum Other {
-    /// An obstacle, by its number; the skeletons near the particle, from and to.
-    Obstacle { number: u32, skeletons: (u32, u32) },
-    /// Another piece, by its label, and its nearest particle.
-    Piece { label: u32, nearest: u32 },
-}
-
-/// What may press on a particle, and does so as it did when it was last integrated.
-#[derive(Clone, Debug)]
-struct Load {
-    particle: u32,
-    other: Other,
-    press: Press,
-    /// The particle from the anchor, then.
-    from_anchor: Vec3,
-    /// Motion from there after which it is integrated again \[m\].
-    patience: f64,
-    /// The anchor: in the frame of a link, or the mean of particles with these parts.
-    link: u32,
-    arm: Vec3,
-    carriers: Vec<(u32, f64)>,
-    /// The particle is in too deep: where it is to go.
-    escape: Option<Vec3>,
-    fresh: bool,
-}
 
 /// Buffers of a step, and what it found.
 #[derive(Debug, Default)]
@@ -197,6 +38,10 @@ pub struct System {
     pub substeps: u32,
     /// Stiffness was more than the sub-steps could follow, or a particle was pushed out of something.
     pub overloaded: bool,
+    /// What each particle has of the coat, at the last look.
+    pub shares: Vec<Share>,
+    /// Links of obstacles, each once.
+    links: Vec<u32>,
     pairs: Vec<(u32, u32, f64)>,
     loads: Vec<Load>,
     near_skeletons: Vec<u32>,
@@ -223,20 +68,16 @@ pub fn with_locale<T>(work: impl FnOnce(&mut Locale) -> T) -> T {
 }
 
 impl System {
-    /// For each pair of matter and obstacle that touch: force on the obstacle, its centre, area, highest pressure and
-    /// stiffness.
-    pub fn contacts(&self, motions: &[Motion], mut tell: impl FnMut(u32, &Obstacle, u32, &Press)) {
+    /// Tells of each load by an obstacle the slots of the body and of the link, and what presses on the particle now.
+    pub fn contacts(&self, motions: &[Motion], mut tell: impl FnMut(u32, u32, &Press)) {
         for load in &self.loads {
-            let Other::Obstacle { number, .. } = load.other else { continue };
+            if load.link == u32::MAX {
+                continue;
+            }
             let push = load.now(&self.swarm, motions, self.softened);
             if push != Vec3::zeros() {
                 let press = Press { push, point: load.anchor(&self.swarm, motions), ..load.press };
-                tell(
-                    self.swarm.matter_of(load.particle as usize).body,
-                    &self.obstacles[number as usize],
-                    load.link,
-                    &press,
-                );
+                tell(self.swarm.matter_of(load.particle as usize).body, load.link, &press);
             }
         }
     }
@@ -271,9 +112,13 @@ impl System {
         for matter in &self.swarm.matters {
             let most = matter.mass * (2.0 * phase / least).powi(2);
             let law = Law::new(matter.spacing, matter.cohesion, most);
-            self.overloaded |= law.stiffness(0.5 * matter.spacing) < 3.9 * matter.cohesion / matter.spacing.powi(2);
+            self.overloaded |= law.cohesion() < matter.cohesion;
             self.laws.push(law);
         }
+        self.links.clear();
+        self.links.extend(self.obstacles.iter().flat_map(|obstacle| &obstacle.side.links));
+        self.links.sort_unstable();
+        self.links.dedup();
         self.build(motions);
         self.refresh(motions, team);
         let mut left = dt;
@@ -401,7 +246,7 @@ impl System {
             let i = load.particle as usize;
             let matter = swarm.matter_of(i);
             let mobility = 1.0 / matter.mass + motions.get(load.link as usize).map_or(0.0, Motion::inverse_mass);
-            sum = if sum.0 == load.particle { (sum.0, sum.1) } else { (load.particle, 0.0) };
+            sum = if sum.0 == load.particle { sum } else { (load.particle, 0.0) };
             if load.press.stiffness > 0.0 {
                 sum.1 += load.press.stiffness * mobility;
                 contact2 = contact2.max(sum.1);
@@ -421,23 +266,14 @@ impl System {
             let velocity = self.swarm.velocity[i];
             self.swarm.place[i] += velocity * h;
         }
-        for link in self.moving_links() {
-            motions[link as usize].drift(h);
+        for link in &self.links {
+            motions[*link as usize].drift(h);
         }
         self.refresh(motions, team);
         self.forces(motions);
         self.kick(motions, 0.5 * h);
         self.rub_pairs(h);
         self.rub_loads(motions, h);
-    }
-
-    /// Links of obstacles, each once.
-    fn moving_links(&self) -> Vec<u32> {
-        let mut links: Vec<u32> =
-            self.obstacles.iter().flat_map(|obstacle| obstacle.side.links.iter().copied()).collect();
-        links.sort_unstable();
-        links.dedup();
-        links
     }
 
     /// Forces between particles, and of loads; how stiff and how fast pairs are.
@@ -453,7 +289,7 @@ impl System {
             let cut = CUT * matter.spacing;
             if offset.norm_squared() < cut * cut {
                 let (n, distance) = direction(&swarm.place[a], &swarm.place[b], [*i, *j]);
-                let (size, stiffness) = law.force_stiffness(distance);
+                let (size, stiffness) = law.push(distance);
                 let push = n * (weight * size);
                 force[a] -= push;
                 force[b] += push;
@@ -477,8 +313,8 @@ impl System {
             let change = self.force[i] * (h / self.swarm.matter_of(i).mass);
             self.swarm.velocity[i] += change;
         }
-        for link in self.moving_links() {
-            motions[link as usize].kick(h);
+        for link in &self.links {
+            motions[*link as usize].kick(h);
         }
         for index in 0..self.loads.len() {
             let load = &self.loads[index];
@@ -548,8 +384,8 @@ impl System {
             }
             let n = push / size;
             let relative = self.swarm.velocity[i] - self.anchor_velocity(load, motions);
-            let (away, mass) = (relative.dot(&n), self.swarm.matter_of(i).mass);
-            let reduced = self.reduced_mass(load, motions, &n, mass);
+            let away = relative.dot(&n);
+            let reduced = self.reduced_mass(load, motions, &n);
             let material = self.material_of(load);
             // Dissipation makes the push p (1 - d v), which never pulls.
             let damped = -(material.dissipation * away * size).min(size);
@@ -583,7 +419,7 @@ impl System {
         }
     }
 
-    fn reduced_mass(&self, load: &Load, motions: &[Motion], n: &Vec3, mass: f64) -> f64 {
+    fn reduced_mass(&self, load: &Load, motions: &[Motion], n: &Vec3) -> f64 {
         let mobility = match motions.get(load.link as usize) {
             Some(motion) => motion.mobility(&(motion.rotation * load.arm), n),
             None => {
@@ -591,7 +427,7 @@ impl System {
                 parts.map(|(j, part)| part * part / self.swarm.matter_of(*j as usize).mass).sum()
             }
         };
-        1.0 / (1.0 / mass + mobility)
+        1.0 / (1.0 / self.swarm.matter_of(load.particle as usize).mass + mobility)
     }
 
     fn material_of(&self, load: &Load) -> Material {
@@ -636,7 +472,7 @@ impl System {
         self.find_pressed();
     }
 
-    /// Pairs of particles whose pieces meet under more than both their thresholds.
+    /// Pairs of particles whose pieces meet under more than the substance's threshold.
     fn find_pressed(&mut self) {
         let Self { swarm, loads, pressed, .. } = self;
         for load in loads.iter().filter(|load| load.fresh) {
@@ -658,155 +494,5 @@ impl System {
         }
         pressed.sort_unstable();
         pressed.dedup();
-    }
-}
-
-impl Load {
-    fn new(particle: u32, other: Other) -> Self {
-        Self {
-            particle,
-            other,
-            press: Press::default(),
-            from_anchor: Vec3::repeat(f64::NAN),
-            patience: 0.0,
-            link: u32::MAX,
-            arm: Vec3::zeros(),
-            carriers: Vec::new(),
-            escape: None,
-            fresh: false,
-        }
-    }
-
-    fn key(&self) -> (u32, u32, u32) {
-        match self.other {
-            Other::Obstacle { number, .. } => (self.particle, 0, number),
-            Other::Piece { label, .. } => (self.particle, 1, label),
-        }
-    }
-
-    /// Where it is held, in the swarm's frame.
-    fn anchor(&self, swarm: &Swarm, motions: &[Motion]) -> Vec3 {
-        match motions.get(self.link as usize) {
-            Some(motion) => (motion.center - swarm.origin) + motion.rotation * self.arm,
-            None => self.carriers.iter().map(|(j, part)| swarm.place[*j as usize] * *part).sum(),
-        }
-    }
-
-    fn shift(&self, swarm: &Swarm, motions: &[Motion]) -> Vec3 {
-        swarm.place[self.particle as usize] - self.anchor(swarm, motions) - self.from_anchor
-    }
-
-    fn is_stale(&self, swarm: &Swarm, motions: &[Motion]) -> bool {
-        let way = self.shift(swarm, motions).norm_squared();
-        // Not a number before the first time.
-        way.is_nan() || way > self.patience * self.patience
-    }
-
-    /// The push now; its stiffness is bounded by what a sub-step can follow, `most` over the mass.
-    fn now(&self, swarm: &Swarm, motions: &[Motion], most: f64) -> Vec3 {
-        let Press { push, stiffness, .. } = &self.press;
-        let size = push.norm();
-        if size == 0.0 {
-            return *push;
-        }
-        let n = push / size;
-        let softer = (most * swarm.matter_of(self.particle as usize).mass / stiffness).min(1.0);
-        n * ((size - stiffness * self.shift(swarm, motions).dot(&n)).max(0.0) * softer)
-    }
-
-    fn integrate(
-        &mut self,
-        swarm: &Swarm,
-        obstacles: &[Obstacle],
-        near: &[u32],
-        motions: &[Motion],
-        locale: &mut Locale,
-    ) {
-        let i = self.particle as usize;
-        let (center, matter, offset) = (swarm.place[i], swarm.matter_of(i), swarm.offset[i]);
-        let profile = &matter.profile;
-        let sizes = (profile.isovalue, profile.radius + offset, profile.thickness + offset);
-        let patience = STALE * sizes.2;
-        let (opposite, stiffness, axis, guess) = match &self.other {
-            Other::Obstacle { number, skeletons } => {
-                let side = &obstacles[*number as usize].side;
-                let skeletons = &near[skeletons.0 as usize..skeletons.1 as usize];
-                let distance = |index: &u32| {
-                    let skeleton = &side.skeletons[*index as usize];
-                    skeleton.shape.closest(&center).distance - skeleton.profile.thickness
-                };
-                let nearest = skeletons.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)));
-                let Some(nearest) = nearest else { return };
-                self.link = side.links[*nearest as usize];
-                let closest = side.skeletons[*nearest as usize].shape.closest(&center);
-                let gap = distance(nearest);
-                if gap > sizes.1 + patience {
-                    // Out of reach: not before it has come nearer.
-                    self.rest(swarm, motions, center - closest.normal * gap, gap - sizes.1);
-                    return;
-                }
-                let other = if side.rigid { f64::INFINITY } else { side.stiffness_scale };
-                let opposite = Opposite::Coat(side, skeletons);
-                let (excess, gradient) = opposite.excess(locale, &center);
-                let axis = gradient.try_normalize(1e-300).unwrap_or(-closest.normal);
-                if excess >= 0.0 || gap < CLOSEST * sizes.2 {
-                    let way = if excess >= 0.0 { excess / gradient.norm().max(1e-300) } else { 0.0 };
-                    let way = way.max(CLOSEST * sizes.2 - gap).min(sizes.2);
-                    self.escape = Some(-axis * way);
-                }
-                (opposite, Stiffness { own: matter.stiffness_scale, other }, axis, gap)
-            }
-            Other::Piece { label, nearest } => {
-                let other = swarm.matter_of(*nearest as usize);
-                self.link = u32::MAX;
-                locale.gather(swarm, i, Some(*label), f64::INFINITY);
-                // Towards those of the piece that are near, the nearest above all.
-                let mut axis = Vec3::zeros();
-                for j in swarm.near.of(i).iter().map(|j| *j as usize).filter(|j| swarm.label[*j] == *label) {
-                    let way = swarm.place[j] - center;
-                    let distance = way.norm();
-                    let reach = (sizes.1 + other.profile.radius + swarm.offset[j]).max(1e-300);
-                    if distance < reach && distance > 0.0 {
-                        axis += way * ((1.0 - distance / reach).powi(4) / distance);
-                    }
-                }
-                let straight = direction(&center, &swarm.place[*nearest as usize], [self.particle, *nearest]);
-                let axis = axis.try_normalize(1e-12).unwrap_or(straight.0);
-                let opposite = Opposite::Piece { isovalue: other.profile.isovalue };
-                let stiffness = Stiffness { own: matter.stiffness_scale, other: other.stiffness_scale };
-                (opposite, stiffness, axis, 0.5 * straight.1)
-            }
-        };
-        if matches!(opposite, Opposite::Coat(..)) {
-            locale.gather(swarm, i, None, f64::INFINITY);
-        }
-        self.press = contact::press(locale, center, axis, guess, sizes, stiffness, &opposite);
-        self.carriers.clear();
-        if self.link == u32::MAX {
-            let carriers = &mut self.carriers;
-            locale.others_at(&self.press.point, |j, value| carriers.push((j, value)));
-            let sum: f64 = carriers.iter().map(|(_, value)| value).sum();
-            if sum <= 0.0 {
-                let Other::Piece { nearest, .. } = self.other else { return };
-                *carriers = vec![(nearest, 1.0)];
-            } else {
-                carriers.iter_mut().for_each(|(_, value)| *value /= sum);
-            }
-        }
-        let point = self.press.gap.map_or(center + axis * guess, |_| self.press.point);
-        let push = self.press.push;
-        self.rest(swarm, motions, point, patience);
-        self.press.push = push;
-    }
-
-    /// Notes where it was integrated.
-    fn rest(&mut self, swarm: &Swarm, motions: &[Motion], point: Vec3, patience: f64) {
-        self.press.push = Vec3::zeros();
-        if let Some(motion) = motions.get(self.link as usize) {
-            self.arm = motion.rotation.inverse() * (point - (motion.center - swarm.origin));
-            self.carriers.clear();
-        }
-        self.from_anchor = swarm.place[self.particle as usize] - self.anchor(swarm, motions);
-        self.patience = patience;
     }
 }

@@ -9,7 +9,7 @@ use std::f64::consts::PI;
 use std::sync::atomic::{Ordering, compiler_fence};
 
 use super::locale::Locale;
-use super::system::Swarm;
+use super::swarm::Swarm;
 use crate::coat::volume::OFFSETS;
 use crate::field::lanes::Lanes;
 use crate::math::Vec3;

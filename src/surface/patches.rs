@@ -196,30 +196,14 @@ fn scattered(count: usize) -> Vec<u32> {
 mod tests {
     use super::*;
     use crate::coat::seeds::rays;
+    use crate::field::skeleton::tests::bounded_shapes;
     use proptest::prelude::*;
     use std::collections::HashSet;
-
-    fn vectors(size: f64) -> impl Strategy<Value = Vec3> {
-        (-size..size, -size..size, -size..size).prop_map(|(x, y, z)| Vec3::new(x, y, z))
-    }
-
-    fn bounded_shapes() -> impl Strategy<Value = Shape> {
-        prop_oneof![
-            vectors(1.0).prop_map(Shape::Point),
-            (vectors(1.0), vectors(1.0)).prop_map(|(a, b)| Shape::segment(a, b)),
-            (vectors(1.0), vectors(1.0), vectors(1.0)).prop_map(|(a, b, c)| Shape::triangle(a, b, c)),
-            (vectors(1.0), vectors(1.0), vectors(2.0)).prop_map(|(center, h, r)| Shape::Box {
-                center,
-                half: h.map(|x| 0.01 + x.abs()),
-                axes: *crate::math::rotation_from_vector(&r).to_rotation_matrix().matrix(),
-            }),
-        ]
-    }
 
     proptest! {
         #[test]
         fn patches_are_closed_with_a_corner_at_each_ray(
-            shape in bounded_shapes(), thickness in 0.01..2.0f64, count in 4usize..400,
+            shape in bounded_shapes(0.01), thickness in 0.01..2.0f64, count in 4usize..400,
         ) {
             let mut all = Vec::new();
             rays(&shape, thickness, count, &mut all);

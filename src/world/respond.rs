@@ -135,7 +135,6 @@ fn plan(state: &mut Stepping, rules: &Rules, team: &Team) {
         if group.response == Response::Substepped {
             let Group { island, candidates, .. } = group;
             let rates = &mut idle(workers).1.rates;
-            rates.resize(motions.len(), 0.0);
             group.substeps = substepped::plan(motions, island, candidates, rules.dt, &rules.limits, rates);
         }
     });
@@ -185,6 +184,9 @@ impl World {
         self.notice_stacks(state);
         while state.workers.len() < team.workers() {
             state.workers.push(Mutex::default());
+        }
+        for worker in &mut state.workers {
+            unlocked(worker).rates.resize(state.motions.len(), 0.0);
         }
         for index in 0..state.island_count {
             let (response, forced) = self.choose(&state.islands[index].island, state, dt);

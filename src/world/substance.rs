@@ -15,7 +15,8 @@ use crate::error::{Error, Result, out_of_range, require, require_finite};
 use crate::field::{Placed, Shape};
 use crate::math::{Vec3, Wrench};
 use crate::substance::pieces::Findings;
-use crate::substance::system::{CROWD, Matter, Obstacle, Swarm, System, with_locale};
+use crate::substance::swarm::{CROWD, Matter, Swarm};
+use crate::substance::system::{System, with_locale};
 use crate::substance::volume::{Share, measure, next_offset};
 pub use crate::substance::{Change, Particle, ParticleId, SubstanceDesc};
 use crate::substance::{MOST_PARTICLES, Substance, fill};
@@ -482,7 +483,7 @@ impl World {
         let contacts: &mut Vec<Contact> = &mut state.substance_contacts;
         let origin = system.swarm.origin;
         let mut sums: BTreeMap<(u32, u32), usize> = BTreeMap::new();
-        system.contacts(motions, |own, _: &Obstacle, link, press| {
+        system.contacts(motions, |own, link, press| {
             let place = *sums.entry((own, link)).or_insert_with(|| {
                 let other = self.links[link as usize].body;
                 contacts.push(Contact {
@@ -530,7 +531,8 @@ impl World {
 
     /// Volumes, offsets, pieces, bonds; and all back to the bodies.
     fn settle_substances(&mut self, system: &mut System, dt: f64, team: &Team) {
-        let mut shares = vec![Share::default(); system.swarm.place.len()];
+        let mut shares = std::mem::take(&mut system.shares);
+        shares.resize_with(system.swarm.place.len(), Share::default);
         // All labels are looked at, then those whose volumes are too far off.
         let mut off = Labels::new();
         for look in 0..LOOKS {
@@ -581,6 +583,7 @@ impl World {
             substance.settle(&findings, dt, reaching);
             first += count;
         }
+        system.shares = shares;
         if system.overloaded
             && !std::mem::replace(&mut system.told, true)
             && let Some(log) = self.log.get_mut()
