@@ -658,7 +658,8 @@ fn three_substances_under_pin_and_knife_never_mix() {
     for step in 0..240 {
         let t = step as f64 / 60.0;
         let rolling = if t < 2.0 { Vec3::new(0.35, 0.0, 0.0) } else { Vec3::new(0.0, 0.0, 0.3) };
-        let cutting = if (2.0..3.3).contains(&t) { Vec3::new(0.0, 0.0, -0.25) } else { Vec3::zeros() };
+        // Down to 2 mm above the ground.
+        let cutting = if (2.0..3.3).contains(&t) { Vec3::new(0.0, 0.0, -0.344 / 1.3) } else { Vec3::zeros() };
         drive(&mut world, pin, rolling);
         drive(&mut world, knife, cutting);
         world.step(1.0 / 60.0).unwrap();

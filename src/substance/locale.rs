@@ -18,31 +18,22 @@ use crate::math::Vec3;
 /// Fields are summed eight at a time, in eight sums: the same bits whatever registers there are.
 const WIDTH: usize = 8;
 
-/// Eight particles, as columns.
+/// Eight particles, as columns. The field of a particle is `c u²` outside its surface and `c (2 u - 1)` inside, with
+/// `u = (R - d) / (R - t)`: that is what [`SubstanceDesc::profile`](super::SubstanceDesc::profile) makes.
 #[derive(Clone, Copy, Debug)]
 struct Block {
     place: [Lanes<WIDTH>; 3],
-    thickness: Lanes<WIDTH>,
-    /// One over the width of the outer part, and the two coefficients of its cubic.
+    radius: Lanes<WIDTH>,
+    /// One over `R - t`.
     inverse_width: Lanes<WIDTH>,
-    cubic: Lanes<WIDTH>,
-    square: Lanes<WIDTH>,
     isovalue: Lanes<WIDTH>,
-    stiffness: Lanes<WIDTH>,
 }
 
 const ZERO: Lanes<WIDTH> = Lanes([0.0; WIDTH]);
 
 /// Eight that have no field.
-const NOBODY: Block = Block {
-    place: [Lanes([1e30; WIDTH]), ZERO, ZERO],
-    thickness: ZERO,
-    inverse_width: Lanes([1.0; WIDTH]),
-    cubic: ZERO,
-    square: ZERO,
-    isovalue: ZERO,
-    stiffness: ZERO,
-};
+const NOBODY: Block =
+    Block { place: [Lanes([1e30; WIDTH]), ZERO, ZERO], radius: ZERO, inverse_width: ZERO, isovalue: ZERO };
 
 /// Particles whose fields add up.
 #[derive(Debug, Default)]
@@ -67,17 +58,12 @@ impl Group {
         }
         let Some(block) = self.blocks.last_mut() else { return };
         let profile = &matter.profile;
-        let width = profile.radius - profile.thickness;
-        let kw = profile.stiffness * width;
         for (axis, column) in block.place.iter_mut().enumerate() {
             column.0[lane] = place[axis];
         }
-        block.thickness.0[lane] = profile.thickness + offset;
-        block.inverse_width.0[lane] = 1.0 / width;
-        block.cubic.0[lane] = kw - 2.0 * profile.isovalue;
-        block.square.0[lane] = 3.0 * profile.isovalue - kw;
+        block.radius.0[lane] = profile.radius + offset;
+        block.inverse_width.0[lane] = 1.0 / (profile.radius - profile.thickness);
         block.isovalue.0[lane] = profile.isovalue;
-        block.stiffness.0[lane] = profile.stiffness;
         self.indices.push(index);
     }
 
@@ -98,6 +84,23 @@ impl Group {
     fn values(&self, p: &Vec3, out: &mut Vec<f64>) {
         out.clear();
         out.extend(self.blocks.iter().flat_map(|block| block.fields::<false>(p)[0].0));
+    }
+
+    /// [`along`] with the widest registers of this processor.
+    fn along(&self, center: &Vec3, on: &mut OnRays) {
+        let count = self.indices.len();
+        #[cfg(target_arch = "x86_64")]
+        {
+            if is_x86_feature_detected!("avx512f") {
+                // SAFETY: the processor has it.
+                return unsafe { along_avx512(&self.blocks, count, center, on) };
+            }
+            if is_x86_feature_detected!("avx2") {
+                // SAFETY: the processor has it.
+                return unsafe { along_avx2(&self.blocks, count, center, on) };
+            }
+        }
+        along(&self.blocks, count, center, on);
     }
 
     /// Sums of the columns of [`Block::fields`], with the widest registers of this processor.
@@ -154,20 +157,12 @@ impl Block {
         for lane in 0..WIDTH {
             let [x, y, z] = [p.x - self.place[0].0[lane], p.y - self.place[1].0[lane], p.z - self.place[2].0[lane]];
             let distance = (x * x + y * y + z * z).sqrt();
-            let depth = self.thickness.0[lane] - distance;
-            // Outside, a cubic in u, which runs from 1 on the surface to 0 where the field ends; inside, a line.
-            let u = 1.0 + depth * self.inverse_width.0[lane];
-            let u = if u > 0.0 { u } else { 0.0 };
-            let outer = u * u * (self.square.0[lane] + self.cubic.0[lane] * u);
-            let inner = self.isovalue.0[lane] + self.stiffness.0[lane] * depth;
-            let inside = depth > 0.0;
-            out[0].0[lane] = if inside { inner } else { outer };
+            let (inverse_width, isovalue) = (self.inverse_width.0[lane], self.isovalue.0[lane]);
+            let (field, slope) = field((self.radius.0[lane] - distance) * inverse_width);
+            out[0].0[lane] = isovalue * field;
             if GRADIENT {
-                let outer_slope =
-                    u * (2.0 * self.square.0[lane] + 3.0 * self.cubic.0[lane] * u) * self.inverse_width.0[lane];
-                let slope = if inside { self.stiffness.0[lane] } else { outer_slope };
                 // At the particle itself the direction is lost, and with it nothing that counts.
-                let over = -slope / if distance > 1e-150 { distance } else { 1e-150 };
+                let over = -slope * isovalue * inverse_width / if distance > 1e-150 { distance } else { 1e-150 };
                 out[1].0[lane] = over * x;
                 out[2].0[lane] = over * y;
                 out[3].0[lane] = over * z;
@@ -175,6 +170,110 @@ impl Block {
         }
         out
     }
+}
+
+/// The field over the isovalue, and its slope, at `u` (see [`Block`]).
+#[inline(always)]
+fn field(u: f64) -> (f64, f64) {
+    let u = if u > 0.0 { u } else { 0.0 };
+    let outer = if u < 1.0 { u } else { 1.0 };
+    (outer * outer + 2.0 * (u - outer), 2.0 * outer)
+}
+
+/// Points on rays from one point, as columns.
+#[derive(Debug, Default)]
+pub struct OnRays {
+    /// Directions, by axis.
+    pub u: [Vec<f64>; 3],
+    /// How far out \[m\].
+    pub r: Vec<f64>,
+    /// The field there, once it was looked up.
+    pub value: Vec<f64>,
+    /// How it changes along the ray.
+    pub slope: Vec<f64>,
+}
+
+impl OnRays {
+    /// None.
+    pub fn clear(&mut self) {
+        self.u.iter_mut().for_each(Vec::clear);
+        self.r.clear();
+    }
+
+    /// One more.
+    pub fn push(&mut self, u: &Vec3, r: f64) {
+        self.u.iter_mut().zip(u.iter()).for_each(|(column, x)| column.push(*x));
+        self.r.push(r);
+    }
+
+    /// Makes them a multiple of eight by copies of the last one: what is left over would be done one by one.
+    fn pad(&mut self) {
+        let count = self.r.len().next_multiple_of(WIDTH);
+        for column in self.u.iter_mut().chain([&mut self.r]) {
+            column.resize(count, column.last().copied().unwrap_or_default());
+        }
+        self.value.resize(count, 0.0);
+        self.slope.resize(count, 0.0);
+    }
+
+    /// Only the first ones.
+    pub fn truncate(&mut self, count: usize) {
+        self.u.iter_mut().for_each(|column| column.truncate(count));
+        self.r.truncate(count);
+    }
+}
+
+/// Fields and slopes at points on rays from `center`.
+#[inline(always)]
+fn along(blocks: &[Block], count: usize, center: &Vec3, on: &mut OnRays) {
+    let OnRays { u: [x, y, z], r, value, slope } = on;
+    value.fill(0.0);
+    slope.fill(0.0);
+    for k in 0..count {
+        let (block, lane) = (&blocks[k / WIDTH], k % WIDTH);
+        let from = [0, 1, 2].map(|axis| center[axis] - block.place[axis].0[lane]);
+        let sizes = (block.radius.0[lane], block.inverse_width.0[lane], block.isovalue.0[lane]);
+        along_one(x, y, z, r, from, sizes, value, slope);
+    }
+}
+
+/// A plain loop over columns: the compiler makes vectors of it, and the bits are the same with any.
+#[inline(always)]
+#[expect(clippy::too_many_arguments, reason = "slices of their own are known not to overlap")]
+fn along_one(
+    x: &[f64],
+    y: &[f64],
+    z: &[f64],
+    r: &[f64],
+    from: [f64; 3],
+    (radius, inverse_width, isovalue): (f64, f64, f64),
+    value: &mut [f64],
+    slope: &mut [f64],
+) {
+    let count = x.len();
+    let (y, z, r) = (&y[..count], &z[..count], &r[..count]);
+    let (value, slope) = (&mut value[..count], &mut slope[..count]);
+    let steepness = isovalue * inverse_width;
+    for at in 0..count {
+        let d = [from[0] + x[at] * r[at], from[1] + y[at] * r[at], from[2] + z[at] * r[at]];
+        let distance = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
+        let (own, steep) = field((radius - distance) * inverse_width);
+        let along = d[0] * x[at] + d[1] * y[at] + d[2] * z[at];
+        value[at] += isovalue * own;
+        slope[at] -= steep * steepness * along / if distance > 1e-150 { distance } else { 1e-150 };
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn along_avx2(blocks: &[Block], count: usize, center: &Vec3, on: &mut OnRays) {
+    along(blocks, count, center, on);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f")]
+fn along_avx512(blocks: &[Block], count: usize, center: &Vec3, on: &mut OnRays) {
+    along(blocks, count, center, on);
 }
 
 /// The field round one particle.
@@ -248,6 +347,11 @@ impl Locale {
         self.bond_starts.push(self.bonds.len() as u32);
     }
 
+    /// Field on the surface of the particle that it was gathered for.
+    pub fn isovalue(&self) -> f64 {
+        self.own.blocks.first().map_or(0.0, |block| block.isovalue.0[0])
+    }
+
     /// Whether any bond matters here.
     pub fn is_bonded(&self) -> bool {
         !self.bonds.is_empty()
@@ -294,16 +398,23 @@ impl Locale {
         if self.bonds.is_empty() || own <= 0.0 { own } else { own + self.bonded(p) / own }
     }
 
-    /// The same, and how it changes along a direction.
-    pub fn value_slope(&mut self, p: &Vec3, u: &Vec3) -> (f64, f64) {
-        let (own, gradient) = self.own_gradient(p);
-        if self.bonds.is_empty() || own <= 0.0 {
-            return (own, gradient.dot(u));
+    /// The same at points on rays from `center`, and how it changes along the rays.
+    pub fn look(&mut self, center: &Vec3, on: &mut OnRays) {
+        on.pad();
+        self.own.along(center, on);
+        if self.bonds.is_empty() {
+            return;
         }
         // Bonds come and go within a part of a piece: a difference will do for the slope of theirs.
         let step = 1e-6 * self.reach;
-        let (here, there) = (self.value(p), self.value(&(p + u * step)));
-        (here, (there - here) / step)
+        for at in 0..on.r.len() {
+            if on.value[at] <= 0.0 {
+                continue;
+            }
+            let u = Vec3::new(on.u[0][at], on.u[1][at], on.u[2][at]);
+            let [here, there] = [on.r[at], on.r[at] + step].map(|r| self.value(&(center + u * r)));
+            (on.value[at], on.slope[at]) = (here, (there - here) / step);
+        }
     }
 
     /// Those of the others that have a field at a point, with their parts of it.

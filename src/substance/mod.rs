@@ -8,6 +8,7 @@
 //! | --- | --- |
 //! | [`neighbours`] | who is near whom, in O(n) |
 //! | [`forces`] | attraction, repulsion, friction between particles |
+//! | [`pairs`] | pairs that attract or repel: forces and friction of all of them |
 //! | [`locale`] | the field round one particle: its own piece, others, bonds between them |
 //! | [`volume`] | what each particle has of the coat; which particles hang together; volume control |
 //! | [`pieces`] | splitting, fusing, bonds that come and go |
@@ -22,6 +23,7 @@ pub mod forces;
 pub mod load;
 pub mod locale;
 pub mod neighbours;
+pub mod pairs;
 pub mod pieces;
 pub mod swarm;
 pub mod system;

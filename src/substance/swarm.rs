@@ -1,8 +1,7 @@
 //! All particles of all substances of a world, side by side, as a step works on them.
 
-use std::sync::Arc;
-
 use super::neighbours::Neighbours;
+use super::volume::Rays;
 use crate::contact::press::Material;
 use crate::field::Profile;
 use crate::math::Vec3;
@@ -13,7 +12,7 @@ pub const SKIN: f64 = 0.2;
 pub const CROWD: f64 = 8.0;
 
 /// What the particles of one substance have in common.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Matter {
     /// Slot of the body.
     pub body: u32,
@@ -40,7 +39,7 @@ pub struct Matter {
     /// Between its pieces.
     pub material: Material,
     /// Seeds.
-    pub directions: Arc<[Vec3]>,
+    pub rays: Rays,
 }
 
 /// All particles of all substances, as columns; in a frame with the world's axes near them.
@@ -114,6 +113,18 @@ impl Swarm {
             self.bond_starts[index] += self.bond_starts[index - 1];
         }
         self.bond_lists.extend(sided.into_iter().map(|(_, b, w)| (b, w)));
+    }
+
+    /// Whether somebody has moved by more than `way` since then, but for what all have.
+    pub fn has_strayed(&self, since: &[Vec3], way: f64) -> bool {
+        let moves = || self.place.iter().zip(since).map(|(now, then)| now - then);
+        let mean = moves().sum::<Vec3>() / self.place.len().max(1) as f64;
+        moves().any(|moved| (moved - mean).norm_squared() > way * way)
+    }
+
+    /// Whether somebody has moved by more than `way` since then.
+    pub fn has_moved(&self, since: &[Vec3], way: f64) -> bool {
+        self.place.iter().zip(since).any(|(now, then)| (now - then).norm_squared() > way * way)
     }
 
     /// Finds who is near whom: all whose fields reach where the surface near a particle can be, and a little farther.

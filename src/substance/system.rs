@@ -6,9 +6,9 @@
 //! got is handed to the step's response, which then solves everything else.
 
 use super::contact::Press;
-use super::forces::{CUT, Law, braked, direction};
 use super::load::{Load, Obstacle, Other};
 use super::locale::Locale;
+use super::pairs::Pairs;
 use super::swarm::{SKIN, Swarm};
 use super::volume::Share;
 use crate::base::Motion;
@@ -42,16 +42,12 @@ pub struct System {
     pub shares: Vec<Share>,
     /// Links of obstacles, each once.
     links: Vec<u32>,
-    pairs: Vec<(u32, u32, f64)>,
+    pairs: Pairs,
     loads: Vec<Load>,
     near_skeletons: Vec<u32>,
     built_at: Vec<Vec3>,
     force: Vec<Vec3>,
-    laws: Vec<Law>,
     softened: f64,
-    /// Stiffness of the stiffest pair over its mass, and square of the speed of the fastest over the thickness.
-    pair_rate2: f64,
-    pair_speed2: f64,
     /// The warning was given.
     pub told: bool,
     /// The forces are those of the present places.
@@ -82,11 +78,17 @@ impl System {
         }
     }
 
-    /// Whether a rigid body is between two particles: a knife cuts, however thin it is.
-    pub fn is_cut(&self, a: usize, b: usize) -> bool {
-        let first = self.loads.partition_point(|load| (load.particle as usize) < a);
+    /// What may press on a particle.
+    pub fn loads_of(&self, particle: usize) -> &[Load] {
+        let first = self.loads.partition_point(|load| (load.particle as usize) < particle);
+        let count = self.loads[first..].iter().take_while(|load| load.particle as usize == particle).count();
+        &self.loads[first..first + count]
+    }
+
+    /// Whether a rigid body is between two particles, the first of which has these loads: a knife cuts, however thin it is.
+    pub fn is_cut(&self, loads: &[Load], a: usize, b: usize) -> bool {
         let line = Shape::Segment(self.swarm.place[a], self.swarm.place[b]);
-        self.loads[first..].iter().take_while(|load| load.particle as usize == a).any(|load| {
+        loads.iter().any(|load| {
             let Other::Obstacle { number, skeletons } = &load.other else { return false };
             let side = &self.obstacles[*number as usize].side;
             let near = &self.near_skeletons[skeletons.0 as usize..skeletons.1 as usize];
@@ -108,13 +110,7 @@ impl System {
         let least = dt / f64::from(most);
         // Nothing of the last step counts, so that a snapshot needs none of it.
         self.loads.clear();
-        self.laws.clear();
-        for matter in &self.swarm.matters {
-            let most = matter.mass * (2.0 * phase / least).powi(2);
-            let law = Law::new(matter.spacing, matter.cohesion, most);
-            self.overloaded |= law.cohesion() < matter.cohesion;
-            self.laws.push(law);
-        }
+        self.overloaded |= self.pairs.couple(&self.swarm.matters, (2.0 * phase / least).powi(2));
         self.links.clear();
         self.links.extend(self.obstacles.iter().flat_map(|obstacle| &obstacle.side.links));
         self.links.sort_unstable();
@@ -139,22 +135,7 @@ impl System {
     fn build(&mut self, motions: &[Motion]) {
         self.swarm.find_neighbours();
         self.built_at.clone_from(&self.swarm.place);
-        self.pairs.clear();
-        let swarm = &self.swarm;
-        for i in 0..swarm.place.len() {
-            let matter = swarm.matter_of(i);
-            let reach = CUT * matter.spacing + SKIN * matter.profile.radius;
-            for j in swarm.near.of(i) {
-                let at = *j as usize;
-                if at <= i || swarm.kind[at] != swarm.kind[i] {
-                    continue;
-                }
-                let weight = if swarm.label[at] == swarm.label[i] { 1.0 } else { swarm.bond(i, at) };
-                if weight > 0.0 && (swarm.place[at] - swarm.place[i]).norm_squared() < reach * reach {
-                    self.pairs.push((i as u32, *j, weight));
-                }
-            }
-        }
+        self.pairs.list(&self.swarm);
         let mut old = std::mem::take(&mut self.loads);
         self.near_skeletons.clear();
         self.place_obstacles(motions);
@@ -238,7 +219,7 @@ impl System {
     /// The longest sub-step that follows what is there.
     fn stride(&self, motions: &[Motion], phase: f64) -> f64 {
         let swarm = &self.swarm;
-        let (rate2, mut speed) = (self.pair_rate2, self.pair_speed2.sqrt());
+        let Pairs { rate2, mut speed, .. } = self.pairs;
         // 2 phase / rate of a pair is phase r_0 sqrt(m / γ) at rest.
         let mut contact2: f64 = 0.0;
         let mut sum: (u32, f64) = (u32::MAX, 0.0);
@@ -272,32 +253,16 @@ impl System {
         self.refresh(motions, team);
         self.forces(motions);
         self.kick(motions, 0.5 * h);
-        self.rub_pairs(h);
+        self.pairs.rub(&mut self.swarm.velocity, &self.swarm.kind, h);
         self.rub_loads(motions, h);
     }
 
-    /// Forces between particles, and of loads; how stiff and how fast pairs are.
+    /// Forces between particles, and of loads.
     fn forces(&mut self, motions: &[Motion]) {
-        let Self { swarm, force, laws, pairs, loads, pair_rate2, pair_speed2, .. } = self;
-        (*pair_rate2, *pair_speed2) = (0.0, 0.0);
+        let Self { swarm, force, pairs, loads, .. } = self;
         force.clear();
         force.extend(swarm.pull.iter().enumerate().map(|(i, pull)| pull * swarm.matter_of(i).mass));
-        for (i, j, weight) in &*pairs {
-            let (a, b) = (*i as usize, *j as usize);
-            let offset = swarm.place[b] - swarm.place[a];
-            let (law, matter) = (&laws[swarm.kind[a] as usize], &swarm.matters[swarm.kind[a] as usize]);
-            let cut = CUT * matter.spacing;
-            if offset.norm_squared() < cut * cut {
-                let (n, distance) = direction(&swarm.place[a], &swarm.place[b], [*i, *j]);
-                let (size, stiffness) = law.push(distance);
-                let push = n * (weight * size);
-                force[a] -= push;
-                force[b] += push;
-                *pair_rate2 = pair_rate2.max(weight * stiffness / matter.mass);
-                let approach = (swarm.velocity[a] - swarm.velocity[b]).norm_squared();
-                *pair_speed2 = pair_speed2.max(approach / (matter.profile.thickness * matter.profile.thickness));
-            }
-        }
+        pairs.push(swarm, force);
         for load in &*loads {
             let push = load.now(swarm, motions, self.softened);
             force[load.particle as usize] += push;
@@ -335,31 +300,6 @@ impl System {
         motion.twist.linear += change.linear;
         motion.twist.angular += change.angular;
         self.carried[link as usize].add_scaled(&wrench, 1.0);
-    }
-
-    /// Friction between particles: central, exact over the sub-step, a pair after the other.
-    fn rub_pairs(&mut self, h: f64) {
-        let swarm = &mut self.swarm;
-        for (i, j, weight) in &self.pairs {
-            let (a, b) = (*i as usize, *j as usize);
-            let matter = &swarm.matters[swarm.kind[a] as usize];
-            let offset = swarm.place[b] - swarm.place[a];
-            let cut = CUT * matter.spacing;
-            let square = offset.norm_squared();
-            if square >= cut * cut || matter.viscosity == 0.0 && matter.damping == 0.0 {
-                continue;
-            }
-            let (n, distance) = direction(&swarm.place[a], &swarm.place[b], [*i, *j]);
-            let speed = (swarm.velocity[b] - swarm.velocity[a]).dot(&n);
-            // It fades with the force, so that nobody is braked at the cut.
-            let fade = weight * (1.0 - distance / cut).powi(2) / (1.0 - 1.0 / CUT).powi(2);
-            let reduced = 0.5 * matter.mass;
-            let critical = 2.0 * (4.0 * matter.cohesion * reduced).sqrt() / matter.spacing;
-            let left = braked(speed, fade * matter.damping * critical, fade * matter.viscosity, reduced, h);
-            let change = n * (0.5 * (left - speed));
-            swarm.velocity[a] -= change;
-            swarm.velocity[b] += change;
-        }
     }
 
     /// Friction and dissipation of loads, and the way out of where nobody may be.
@@ -449,16 +389,11 @@ impl System {
 
     /// Integrates the loads that have moved, and finds neighbours again where these have.
     fn refresh(&mut self, motions: &[Motion], team: &Team) {
-        let count = self.swarm.place.len();
-        let moved = |i: usize| self.swarm.place[i] - self.built_at[i];
-        let mean = (0..count).map(moved).sum::<Vec3>() / count.max(1) as f64;
         let skin = 0.5 * SKIN * self.swarm.matters.iter().map(|m| m.profile.radius).fold(f64::INFINITY, f64::min);
-        // Among themselves, what all have moved does not count; against obstacles it does.
-        let strayed =
-            |i: usize| (moved(i) - mean).norm_squared() > skin * skin || moved(i).norm_squared() > 4.0 * skin * skin;
-        if (0..count).any(strayed) {
+        if self.swarm.has_strayed(&self.built_at, skin) || self.swarm.has_moved(&self.built_at, 2.0 * skin) {
             self.build(motions);
         }
+        self.pairs.refresh(&self.swarm);
         self.place_obstacles(motions);
         let Self { swarm, obstacles, loads, near_skeletons, .. } = self;
         let (swarm, obstacles, near): (&Swarm, &[Obstacle], &[u32]) = (swarm, obstacles, near_skeletons);

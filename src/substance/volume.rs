@@ -5,21 +5,21 @@
 //! territories is where `d_i - ε_i = d_j - ε_j`: a closed form on a ray. A ray that ends at a border within the solid
 //! shows that the two hang together.
 
+use std::cell::RefCell;
 use std::f64::consts::PI;
-use std::sync::atomic::{Ordering, compiler_fence};
 
-use super::locale::Locale;
+use super::locale::{Locale, OnRays};
 use super::swarm::Swarm;
 use crate::coat::volume::OFFSETS;
-use crate::field::lanes::Lanes;
 use crate::math::Vec3;
 
 /// Longest way of an offset in one step, as a fraction of the thickness.
 const STRIDE: f64 = 0.1;
 /// Errors below this, as lengths over the thickness, are taken back in proportion.
 const CALM: f64 = 0.02;
-/// How near a ray's end must be, over the thickness.
-const CLOSE: f64 = 1e-4;
+/// Last step of Newton's method along a ray, over the thickness: what is left after it is a hundredth of that, far below
+/// what the number of rays leaves out.
+const CLOSE: f64 = 3e-3;
 /// Least area that counts as exposed, as a fraction of the area of a ball of the same volume.
 const LEAST_AREA: f64 = 0.2;
 
@@ -34,143 +34,301 @@ pub struct Share {
     pub joined: Vec<u32>,
 }
 
-/// Rivals are looked at eight at a time.
-const WIDTH: usize = 8;
-
-/// Those whose territories border on that of a particle: the border with one at `q` is at `first / (u·q + excess)` on a ray,
-/// `first = (|q|² - excess²) / 2`, `excess` how much farther out its offset is. Eight of them, as columns.
-#[derive(Clone, Copy)]
-struct Rivals {
-    q: [Lanes<WIDTH>; 3],
-    first: Lanes<WIDTH>,
-    excess: Lanes<WIDTH>,
+/// Directions of rays that have the same solid angle each, as columns.
+#[derive(Debug, Default)]
+pub struct Rays {
+    u: [Vec<f64>; 3],
 }
 
-/// Eight whose borders no ray meets.
-const NOBODY: Rivals = Rivals { q: [Lanes([0.0; WIDTH]); 3], first: Lanes([1.0; WIDTH]), excess: Lanes([0.0; WIDTH]) };
+impl Rays {
+    /// In these directions.
+    pub fn new(directions: impl Iterator<Item = Vec3>) -> Self {
+        let mut rays = Self::default();
+        for direction in directions {
+            rays.u.iter_mut().zip(direction.iter()).for_each(|(column, x)| column.push(*x));
+        }
+        rays
+    }
 
-/// The nearest border that a ray meets before `end`, and whose it is. Borders are fractions, compared without dividing.
+    fn count(&self) -> usize {
+        self.u[0].len()
+    }
+
+    fn direction(&self, ray: usize) -> Vec3 {
+        Vec3::new(self.u[0][ray], self.u[1][ray], self.u[2][ray])
+    }
+}
+
+/// One whose territory borders on that of a particle: the border is at `first / (u·q + excess)` on a ray,
+/// `first = (|q|² - excess²) / 2`, `excess` how much farther out its offset is.
+#[derive(Clone, Copy, Debug)]
+struct Rival {
+    q: [f64; 3],
+    first: f64,
+    excess: f64,
+    /// Who it is, and how far the two blend.
+    owner: u32,
+    weight: f64,
+}
+
+/// The nearest border that each ray meets: `first / slope`, and the number of the rival.
+#[derive(Debug, Default)]
+struct Borders {
+    first: Vec<f64>,
+    slope: Vec<f64>,
+    rival: Vec<f64>,
+}
+
+/// No rival.
+const NONE: f64 = -1.0;
+
+impl Borders {
+    /// None nearer than `end`.
+    fn reset(&mut self, count: usize, end: f64) {
+        for (column, x) in [(&mut self.first, end), (&mut self.slope, 1.0), (&mut self.rival, NONE)] {
+            column.clear();
+            column.resize(count, x);
+        }
+    }
+
+    fn distance(&self, ray: usize) -> f64 {
+        (self.first[ray] / self.slope[ray]).max(0.0)
+    }
+
+    fn rival(&self, ray: usize) -> Option<usize> {
+        (self.rival[ray] >= 0.0).then_some(self.rival[ray] as usize)
+    }
+
+    /// Looks at these rivals too, the first of which has this number, with the widest registers of this processor; the same
+    /// bits with any.
+    fn meet(&mut self, rays: &Rays, rivals: &[Rival], number: usize) {
+        #[cfg(target_arch = "x86_64")]
+        {
+            if is_x86_feature_detected!("avx512f") {
+                // SAFETY: the processor has it.
+                return unsafe { meet_avx512(rays, rivals, number, self) };
+            }
+            if is_x86_feature_detected!("avx2") {
+                // SAFETY: the processor has it.
+                return unsafe { meet_avx2(rays, rivals, number, self) };
+            }
+        }
+        meet(rays, rivals, number, self);
+    }
+}
+
 #[inline(always)]
-fn nearest(rivals: &[Rivals], u: &Vec3, end: f64) -> (f64, Option<usize>) {
-    let (mut firsts, mut slopes, mut blocks) = ([end; WIDTH], [1.0; WIDTH], [-1.0; WIDTH]);
-    let mut block = 0.0;
-    for rivals in rivals {
-        compiler_fence(Ordering::SeqCst);
-        for lane in 0..WIDTH {
-            let first = rivals.first.0[lane];
-            let slope = u.x * rivals.q[0].0[lane]
-                + u.y * rivals.q[1].0[lane]
-                + u.z * rivals.q[2].0[lane]
-                + rivals.excess.0[lane];
-            let ahead = if slope > 0.0 { slope } else { 0.0 };
-            let is_nearer = first * slopes[lane] < firsts[lane] * ahead;
-            firsts[lane] = if is_nearer { first } else { firsts[lane] };
-            slopes[lane] = if is_nearer { ahead } else { slopes[lane] };
-            blocks[lane] = if is_nearer { block } else { blocks[lane] };
-        }
-        block += 1.0;
+fn meet(rays: &Rays, rivals: &[Rival], number: usize, borders: &mut Borders) {
+    let ([x, y, z], Borders { first, slope, rival: nearest }) = (&rays.u, borders);
+    for (at, rival) in rivals.iter().enumerate() {
+        meet_one(x, y, z, rival, (number + at) as f64, first, slope, nearest);
     }
-    let mut best = (end, None);
-    for lane in 0..WIDTH {
-        let border = firsts[lane] / slopes[lane];
-        if blocks[lane] >= 0.0 && border < best.0 {
-            best = (border, Some(blocks[lane] as usize * WIDTH + lane));
-        }
+}
+
+/// Borders are fractions, compared without dividing. A plain loop over columns: the compiler makes vectors of it.
+#[inline(always)]
+#[expect(clippy::too_many_arguments, reason = "slices of their own are known not to overlap")]
+fn meet_one(
+    x: &[f64],
+    y: &[f64],
+    z: &[f64],
+    rival: &Rival,
+    number: f64,
+    first: &mut [f64],
+    slope: &mut [f64],
+    nearest: &mut [f64],
+) {
+    let count = x.len();
+    let (y, z) = (&y[..count], &z[..count]);
+    let (first, slope, nearest) = (&mut first[..count], &mut slope[..count], &mut nearest[..count]);
+    let (q, border, excess) = (rival.q, rival.first, rival.excess);
+    for ray in 0..count {
+        let along = x[ray] * q[0] + y[ray] * q[1] + z[ray] * q[2] + excess;
+        let ahead = if along > 0.0 { along } else { 0.0 };
+        let is_nearer = border * slope[ray] < first[ray] * ahead;
+        first[ray] = if is_nearer { border } else { first[ray] };
+        slope[ray] = if is_nearer { ahead } else { slope[ray] };
+        nearest[ray] = if is_nearer { number } else { nearest[ray] };
     }
-    (best.0.max(0.0), best.1)
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn nearest_avx2(rivals: &[Rivals], u: &Vec3, end: f64) -> (f64, Option<usize>) {
-    nearest(rivals, u, end)
+fn meet_avx2(rays: &Rays, rivals: &[Rival], number: usize, borders: &mut Borders) {
+    meet(rays, rivals, number, borders);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f")]
-fn nearest_avx512(rivals: &[Rivals], u: &Vec3, end: f64) -> (f64, Option<usize>) {
-    nearest(rivals, u, end)
+fn meet_avx512(rays: &Rays, rivals: &[Rival], number: usize, borders: &mut Borders) {
+    meet(rays, rivals, number, borders);
 }
 
-/// [`nearest`] with the widest registers of this processor; the same bits with any.
-fn nearest_border(rivals: &[Rivals], u: &Vec3, end: f64) -> (f64, Option<usize>) {
-    #[cfg(target_arch = "x86_64")]
-    {
-        if is_x86_feature_detected!("avx512f") {
-            // SAFETY: the processor has it.
-            return unsafe { nearest_avx512(rivals, u, end) };
-        }
-        if is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has it.
-            return unsafe { nearest_avx2(rivals, u, end) };
-        }
-    }
-    nearest(rivals, u, end)
+/// A ray that does not end at a border close by.
+#[derive(Clone, Copy, Debug)]
+struct Late {
+    ray: usize,
+    /// The surface lies between these, perhaps here.
+    low: f64,
+    high: f64,
+    guess: f64,
+    /// Of the particle that the ray meets: how far the two blend, and where the border is.
+    weight: f64,
+    border: f64,
 }
 
-/// Measures particle `index` by rays of these directions, each of the same solid angle.
-pub fn measure(swarm: &Swarm, index: usize, directions: &[Vec3], locale: &mut Locale, share: &mut Share) {
-    share.volume = 0.0;
-    share.exposed = 0.0;
-    share.joined.clear();
-    let (center, own_offset, label) = (swarm.place[index], swarm.offset[index], swarm.label[index]);
-    let matter = swarm.matter_of(index);
-    let thickness = matter.profile.thickness + own_offset;
-    let isovalue = matter.profile.isovalue;
-    let farthest = matter.farthest + own_offset;
-    locale.gather(swarm, index, None, farthest + swarm.widest);
-    // Whose borders they are, and how far they blend.
-    let mut owners: Vec<(u32, f64)> = Vec::with_capacity(64);
-    let mut rivals: Vec<Rivals> = Vec::with_capacity(8);
-    for j in swarm.near.of(index) {
-        let j_at = *j as usize;
-        let weight = if swarm.label[j_at] == label { 1.0 } else { swarm.bond(index, j_at) };
-        let q = swarm.place[j_at] - center;
-        let excess = swarm.offset[j_at] - own_offset;
-        let square = q.norm_squared();
-        // Beyond, the border is farther away than the surface.
-        if weight <= 0.0 || square >= (2.0 * farthest + excess).powi(2) {
-            continue;
+/// Measures particles. Each thread has its own.
+#[derive(Debug, Default)]
+pub struct Ruler {
+    locale: Locale,
+    rivals: Vec<Rival>,
+    borders: Borders,
+    met: Vec<Late>,
+    late: Vec<Late>,
+    points: OnRays,
+}
+
+thread_local! {
+    static RULER: RefCell<Ruler> = RefCell::default();
+}
+
+/// Measures particle `index` by its rays.
+pub fn measure(swarm: &Swarm, index: usize, share: &mut Share) {
+    RULER.with_borrow_mut(|ruler| ruler.measure(swarm, index, share));
+}
+
+impl Ruler {
+    fn measure(&mut self, swarm: &Swarm, index: usize, share: &mut Share) {
+        share.volume = 0.0;
+        share.exposed = 0.0;
+        share.joined.clear();
+        let (matter, offset) = (swarm.matter_of(index), swarm.offset[index]);
+        let rays = &matter.rays;
+        let farthest = matter.farthest + offset;
+        let solid_angle = 4.0 * PI / rays.count() as f64;
+        // Up to here two alone are a solid together; and the neck of two may be thinner than what rays see.
+        let close = matter.half + offset;
+        self.rivals.clear();
+        self.list_rivals(swarm, index, (f64::NEG_INFINITY, close));
+        share.joined.extend(self.rivals.iter().map(|rival| rival.owner));
+        let near = self.rivals.len();
+        self.borders.reset(rays.count(), farthest);
+        self.borders.meet(rays, &self.rivals, 0);
+        let far = (0..rays.count()).map(|ray| self.borders.distance(ray)).fold(0.0, f64::max);
+        if far > close {
+            self.list_rivals(swarm, index, (close, farthest));
+            self.borders.meet(rays, &self.rivals[near..], near);
         }
-        let (lane, first) = (owners.len() % WIDTH, 0.5 * (square - excess * excess));
-        if lane == 0 {
-            rivals.push(NOBODY);
-        }
-        if let Some(block) = rivals.last_mut() {
-            for axis in 0..3 {
-                block.q[axis].0[lane] = q[axis];
+        let Self { borders, rivals, met, late, .. } = self;
+        met.clear();
+        late.clear();
+        // A guess from which most need two or three rounds.
+        let low = (matter.profile.thickness + offset).min(farthest);
+        for ray in 0..rays.count() {
+            let border = borders.distance(ray);
+            match borders.rival(ray).map(|rival| rivals[rival].weight) {
+                Some(weight) if weight >= 1.0 && border <= close => share.add(solid_angle, border, 0.0),
+                Some(weight) => met.push(Late { ray, low, high: farthest, guess: close, weight, border }),
+                None => late.push(Late { ray, low, high: farthest, guess: close, weight: 0.0, border }),
             }
-            (block.first.0[lane], block.excess.0[lane]) = (first, excess);
         }
-        owners.push((*j, weight));
-        // The neck of two may be thinner than what rays see.
-        let reach = first / (square.sqrt() + excess);
-        if first <= 0.0 || reach - own_offset <= matter.half {
-            share.join(*j);
+        if !met.is_empty() || !late.is_empty() {
+            self.locale.gather(swarm, index, None, farthest + swarm.widest);
+            self.find_solid(&swarm.place[index], rays, close, solid_angle, share);
+            let near = CLOSE * (matter.profile.thickness + offset);
+            self.find_surface(&swarm.place[index], rays, near, solid_angle, share);
         }
     }
-    let solid_angle = 4.0 * PI / directions.len() as f64;
-    for u in directions {
-        let (near, rival) = nearest_border(&rivals, u, farthest);
-        let rival = rival.map(|place| owners[place]);
-        let Some((other, weight)) = rival else {
-            let distance = surface(locale, &center, u, farthest, thickness, isovalue);
-            share.add(solid_angle, distance, 1.0);
-            continue;
-        };
-        // Both have the same field at the border, and most often these two are enough.
-        let is_solid = near - own_offset <= matter.half || locale.value(&(center + u * near)) >= isovalue;
-        if is_solid {
-            share.join(other);
+
+    /// Lists with whom particle `index` blends and has a border whose nearest point is within this range.
+    fn list_rivals(&mut self, swarm: &Swarm, index: usize, (from, to): (f64, f64)) {
+        let (center, offset, label) = (swarm.place[index], swarm.offset[index], swarm.label[index]);
+        for owner in swarm.near.of(index) {
+            let other = *owner as usize;
+            let q = swarm.place[other] - center;
+            let excess = swarm.offset[other] - offset;
+            let square = q.norm_squared();
+            // The nearest point is at (|q| - excess) / 2.
+            let is_within = |end: f64| 2.0 * end + excess >= 0.0 && square <= (2.0 * end + excess).powi(2);
+            if !is_within(to) || is_within(from) {
+                continue;
+            }
+            let weight = if swarm.label[other] == label { 1.0 } else { swarm.bond(index, other) };
+            if weight > 0.0 {
+                let first = 0.5 * (square - excess * excess);
+                self.rivals.push(Rival { q: q.into(), first, excess, owner: *owner, weight });
+            }
         }
-        if weight >= 1.0 {
-            let distance = if is_solid { near } else { surface(locale, &center, u, near, thickness, isovalue) };
-            share.add(solid_angle, distance, f64::from(u8::from(!is_solid)));
-        } else {
-            // Half way of becoming one: between where the ray would end alone, and where it ends with the other.
-            let alone = surface(locale, &center, u, farthest, thickness, isovalue);
-            let distance = alone + (near.min(alone) - alone) * weight;
-            share.add(solid_angle, distance, 1.0 - weight);
+    }
+
+    /// Which rays meet a border within the solid; those that do not end there are late.
+    fn find_solid(&mut self, center: &Vec3, rays: &Rays, close: f64, solid_angle: f64, share: &mut Share) {
+        let Self { locale, rivals, borders, met, late, points, .. } = self;
+        points.clear();
+        met.iter().for_each(|Late { ray, border, .. }| points.push(&rays.direction(*ray), *border));
+        locale.look(center, points);
+        for (at, mut ray) in met.iter().copied().enumerate() {
+            let Some(rival) = borders.rival(ray.ray) else { continue };
+            let rival = &rivals[rival];
+            let excess = points.value[at] - locale.isovalue();
+            // Both have the same field at the border, and most often these two are enough.
+            let is_solid = ray.border <= close || excess >= 0.0;
+            if is_solid {
+                share.join(rival.owner);
+            }
+            if rival.weight >= 1.0 {
+                if is_solid {
+                    share.add(solid_angle, ray.border, 0.0);
+                    continue;
+                }
+                // The surface is before the border.
+                let step = -excess / points.slope[at];
+                (ray.high, ray.weight) = (ray.border.max(ray.low), 0.0);
+                ray.guess = if step < 0.0 { ray.border + step } else { ray.guess };
+            }
+            late.push(ray);
+        }
+    }
+
+    /// Where late rays leave the solid, to a last step of `near`: Newton's method in a bracket.
+    fn find_surface(&mut self, center: &Vec3, rays: &Rays, near: f64, solid_angle: f64, share: &mut Share) {
+        let Self { locale, late, points, .. } = self;
+        points.clear();
+        for ray in &*late {
+            points.push(&rays.direction(ray.ray), ray.guess.clamp(ray.low, ray.high));
+        }
+        while !late.is_empty() {
+            locale.look(center, points);
+            let mut left = 0;
+            for at in 0..late.len() {
+                let mut ray = late[at];
+                let (r, slope) = (points.r[at], points.slope[at]);
+                let excess = points.value[at] - locale.isovalue();
+                if excess >= 0.0 {
+                    ray.low = r;
+                } else {
+                    ray.high = r;
+                }
+                let step = -excess / slope;
+                let is_near = slope < 0.0 && step.abs() <= near;
+                if is_near || ray.high - ray.low <= 1e-3 * near {
+                    let alone = if is_near { (r + step).clamp(ray.low, ray.high) } else { ray.low };
+                    // Half way of becoming one: between where the ray would end alone, and where it ends with the other.
+                    let distance = alone + (ray.border.min(alone) - alone) * ray.weight;
+                    share.add(solid_angle, distance, 1.0 - ray.weight);
+                    continue;
+                }
+                let next = r + step;
+                let is_within = slope < 0.0 && next > ray.low && next < ray.high;
+                late[left] = ray;
+                points.r[left] = if is_within { next } else { 0.5 * (ray.low + ray.high) };
+                for column in &mut points.u {
+                    column[left] = column[at];
+                }
+                left += 1;
+            }
+            late.truncate(left);
+            points.truncate(left);
         }
     }
 }
@@ -187,29 +345,6 @@ impl Share {
             self.joined.push(other);
         }
     }
-}
-
-/// Where a ray leaves the solid, before `end`: Newton's method from outside, where fields are convex, in a bracket. What
-/// is left is far below what the number of rays leaves out.
-fn surface(locale: &mut Locale, center: &Vec3, u: &Vec3, end: f64, thickness: f64, isovalue: f64) -> f64 {
-    let (mut low, mut high) = (thickness, end);
-    let mut r = high;
-    while high - low > CLOSE * thickness {
-        let (value, slope) = locale.value_slope(&(center + u * r), u);
-        let excess = value - isovalue;
-        if excess >= 0.0 {
-            low = r;
-        } else {
-            high = r;
-        }
-        let step = -excess / slope;
-        if slope < 0.0 && step.abs() <= CLOSE * thickness {
-            return (r + step).clamp(thickness, end);
-        }
-        let next = r + step;
-        r = if slope < 0.0 && next > low && next < high { next } else { 0.5 * (low + high) };
-    }
-    low
 }
 
 /// The next offset of a particle: Newton's method on the volume, damped by `gain`; `missing` is what its piece lacks

@@ -16,8 +16,8 @@ use crate::field::{Placed, Shape};
 use crate::math::{Vec3, Wrench};
 use crate::substance::pieces::Findings;
 use crate::substance::swarm::{CROWD, Matter, Swarm};
-use crate::substance::system::{System, with_locale};
-use crate::substance::volume::{Share, measure, next_offset};
+use crate::substance::system::System;
+use crate::substance::volume::{Rays, Share, measure, next_offset};
 pub use crate::substance::{Change, Particle, ParticleId, SubstanceDesc};
 use crate::substance::{MOST_PARTICLES, Substance, fill};
 use crate::team::Team;
@@ -427,7 +427,7 @@ impl World {
                 profile,
                 stiffness_scale: body.stiffness_scale,
                 material: material(body, body),
-                directions: rays.iter().map(|ray| ray.direction).collect(),
+                rays: Rays::new(rays.iter().map(|ray| ray.direction)),
             });
             for particle in &substance.particles {
                 swarm.place.push(particle.position - swarm.origin);
@@ -539,7 +539,7 @@ impl World {
             let swarm = &mut system.swarm;
             team.each_mut(&mut shares, MEASURED, |index, share| {
                 if look == 0 || off.contains(&swarm.label[index]) {
-                    with_locale(|locale| measure(swarm, index, &swarm.matter_of(index).directions, locale, share));
+                    measure(swarm, index, share);
                 }
             });
             off = self.control_particles(swarm, &shares, (look > 0).then_some(&off));
@@ -564,8 +564,8 @@ impl World {
             let local = |index: u32| index - first as u32;
             let mut findings = Findings::default();
             for index in own.clone() {
-                let joined = shares[index].joined.iter();
-                let joined = joined.filter(|other| is_own(other) && !system.is_cut(index, **other as usize));
+                let (joined, loads) = (shares[index].joined.iter(), system.loads_of(index));
+                let joined = joined.filter(|other| is_own(other) && !system.is_cut(loads, index, **other as usize));
                 findings.joined.extend(joined.map(|other| [local(index as u32), local(*other)]));
             }
             let pressed = system.pressed.iter().filter(|pair| pair.iter().all(is_own));
