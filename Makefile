@@ -215,6 +215,10 @@ extremes: ## all rows of the stability tables, into docs/extremes.md, and a pyra
 		echo 'No rows under Bullet: libbullet-dev is missing.'; \
 	fi
 
+.PHONY: loaf
+loaf: ## a loaf of a thousand particles on a wedge, its halves pushed together again (takes a minute)
+	$(CARGO) test --release --test substance -- --ignored --nocapture
+
 .PHONY: count
 count: ## what a scene pays for what it uses: bytes a body, instructions a step (needs valgrind)
 	$(CARGO) test --release --test count -- --ignored --nocapture
