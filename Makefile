@@ -172,12 +172,7 @@ test-symbols: build
 symbols: build ## accept today's exported functions as tests/abi/symbols.txt
 	@tools/symbols.sh '$(SHAREDLIB)' '$(STATICLIB)' update
 
-# A program that hangs must not hang the run.
-LIMIT := $(if $(shell command -v timeout),timeout 300)
-run_each = @test -n '$(strip $(1))' || { echo 'no program found for this stage'; exit 1; }; \
-	for program in $(1); do echo "-- $${program\#\#*/}"; $(LIMIT) $(2) $$program || { status=$$?; \
-		echo "$$program failed: exit code $$status$$(test $$status != 124 || echo ', too slow')"; exit 1; }; done; \
-	echo '$(words $(1)) program(s) passed'
+run_each = @tools/run_each.sh '$(2)' $(1)
 
 test-c: $(C_TEST_BINS)
 	$(call run_each,$(C_TEST_BINS),)
