@@ -447,7 +447,8 @@ proptest! {
     #[test]
     fn any_bytes_are_refused_without_a_panic(mut bytes in prop::collection::vec(any::<u8>(), 0..200), header in any::<bool>()) {
         if header {
-            bytes.splice(0..0, small()[..28].to_vec());
+            static SMALL: std::sync::OnceLock<Vec<u8>> = std::sync::OnceLock::new();
+            bytes.splice(0..0, SMALL.get_or_init(small)[..28].iter().copied());
         }
         refusal(bytes);
     }

@@ -1,7 +1,8 @@
 /*
  * A clover falls down a staircase: three leaves and a stem, four points in one soft coat on one rigid link. With a
- * folder as argument it leaves pictures there. Exits 0 when nothing ever presses through half of the coat, when the
- * clover lies still at the foot of the stairs in the end, and when no flight has more energy than the flight before.
+ * folder as argument it leaves pictures there, with --record FILE a recording. Exits 0 when nothing ever presses
+ * through half of the coat, when the clover lies still at the foot of the stairs in the end, and when no flight has
+ * more energy than the flight before.
  */
 #include <isocoat/isocoat.h>
 

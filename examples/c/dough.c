@@ -2,7 +2,8 @@
  * Two lumps of clay on a table are pressed together by two plates that the host drives, held for a while, and pulled
  * apart again by their ends. Where the pressure between them is above the threshold of the clay, they fuse little by
  * little and are one lump; with a threshold that is never met they only lean on each other. Both are shown. With a
- * folder as argument it leaves pictures there. Exits 0 when the first is one piece in the end and the second two.
+ * folder as argument it leaves pictures there, with --record FILE a recording. Exits 0 when the first is one piece in
+ * the end and the second two.
  */
 #include <isocoat/isocoat.h>
 

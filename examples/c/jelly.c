@@ -1,8 +1,8 @@
 /*
  * A cube of jelly falls on its corner: 64 point masses, each with a coat, held together by springs along edges and
- * across faces and cells. With a folder as argument it leaves pictures there. Exits 0 when there is never more energy
- * than at the start, when the cube lies still in the end with the ground carrying its weight, and when no edge is off
- * by 5 % then.
+ * across faces and cells. With a folder as argument it leaves pictures there, with --record FILE a recording. Exits 0
+ * when there is never more energy than at the start, when the cube lies still in the end with the ground carrying its
+ * weight, and when no edge is off by 5 % then.
  */
 #include <isocoat/isocoat.h>
 

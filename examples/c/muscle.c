@@ -1,8 +1,9 @@
 /*
  * An arm flexes: bones of the upper arm and of the forearm and a biceps of points, all in one coat that keeps the
  * volume of each of its parts. The target volume of the biceps doubles while the elbow bends, and returns. With a
- * folder as argument it leaves pictures there. Exits 0 when half a second after its target came to rest the biceps has
- * it, within 2 %, both times, and when in the end its neighbours have the volume that they began with, within 3 %.
+ * folder as argument it leaves pictures there, with --record FILE a recording. Exits 0 when half a second after its
+ * target came to rest the biceps has it, within 2 %, both times, and when in the end its neighbours have the volume
+ * that they began with, within 3 %.
  */
 #include <isocoat/isocoat.h>
 

@@ -1,7 +1,7 @@
 // A character falls on its side down three stairs, as in Fig. 14 of the paper: fifteen rigid bodies of Bullet's on
 // cone-twist joints and hinges, one coat that blends at the joints and collides with itself everywhere else.
 //
-//     bullet_character [folder for pictures]
+//     bullet_character [folder for pictures] [--record FILE]
 //
 // Exits with 0 when it has touched itself on the way and lies on the stairs at the end. It does not lie quite still:
 // its joints are Bullet's, solved apart from the contacts, and with many limbs touching, each one's load through them is an

@@ -1,7 +1,7 @@
 // A character walks through a heap of loose, soft balls and pushes them aside. The host animates it: every limb is a
 // kinematic link, whose pose and velocities the host sets in each tick, whatever happens; the balls are isocoat's own.
 //
-//     walk [folder for pictures]
+//     walk [folder for pictures] [--record FILE]
 //
 // Exits with 0 when enough balls were moved, none is in the ground or in a limb, and all lie still in the end.
 #include <algorithm>

@@ -45,6 +45,12 @@ impl World {
 }
 
 impl Sight<'_> {
+    /// The same without a body: what it presses on stays as it is, and what it hid can be seen.
+    pub fn without(mut self, body: BodyId) -> Self {
+        self.coats.retain(|seen| self.world.bodies.id_of(seen.body) != body);
+        self
+    }
+
     /// The first coat that a ray meets, as [`World::cast_ray_deformed`] gives it.
     pub fn cast_ray(&self, origin: &Vec3, direction: &Vec3, max_distance: f64) -> Result<Option<RayHit>> {
         first_hit(origin, direction, max_distance, self.coats.iter(), |seen: &Seen, direction, length| {
