@@ -15,7 +15,7 @@
 //! | kind | content |
 //! | --- | --- |
 //! | 0 | a structure: settings, bodies, links, skeletons with their slots, as in a [snapshot](super::snapshot) |
-//! | 1 | a frame by itself: time (8), then its numbers as [`pack`] has them |
+//! | 1 | a frame by itself: time (8), then its numbers as [`pack`](mod@pack) has them |
 //! | 2 | a frame by what differs from the last two |
 //! | 3 | the index |
 //!
