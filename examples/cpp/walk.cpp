@@ -96,7 +96,7 @@ public:
             const vec3 center = plus(character::middle(part), root_);
             std::copy(center.begin(), center.end(), desc.pose.position);
             links.push_back(skin.create_link(desc));
-            links.back().create_skeleton(character::skeleton_of(part));
+            character::dress(links.back(), part);
             links_.push_back(links.back().raw());
         }
         character::join(skin, links);
