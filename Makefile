@@ -117,7 +117,7 @@ demo-plot:
 	@mkdir -p $(OUT)
 	$(CARGO) run --release --quiet --example two_balls_plot -- $(OUT)/two_balls.svg
 
-SCENES := clover muscle jelly dough skin cpp/walk cpp/bullet_character
+SCENES := collision clover muscle jelly dough skin cpp/walk cpp/bullet_character
 
 .PHONY: scenes
 scenes: $(SCENES:%=$(WORK)/examples/%) ## characters, muscles, jelly: run each scene, with pictures in out/
@@ -125,11 +125,22 @@ scenes: $(SCENES:%=$(WORK)/examples/%) ## characters, muscles, jelly: run each s
 		printf '\n== %s\n' $$scene; mkdir -p $(OUT)/$${scene##*/} && $(WORK)/examples/$$scene $(OUT)/$${scene##*/} || exit 1; \
 	done
 
+VIEWER := $(TARGET)/viewer/release/isocoat-view
+
+# Cargo decides what is out of date.
+.PHONY: viewer
+viewer: ## build what makes pictures, PLY, OBJ and glTF of recordings
+	$(CARGO) build --release --manifest-path tools/viewer/Cargo.toml --target-dir '$(TARGET)/viewer'
+
+.PHONY: gallery
+gallery: viewer $(SCENES:%=$(WORK)/examples/%) ## record the scenes, and show them in docs/gallery (takes minutes)
+	@tools/gallery.sh '$(WORK)/examples' '$(VIEWER)' '$(WORK)/recordings' docs/gallery
+
 # ---- test ------------------------------------------------------------------------------------------------------------
 
 # In this order; the first that fails stops the run. Each is also a target: `make test-valgrind`. What cargo runs comes
 # first, then what is linked to the libraries.
-STAGES := format clippy rust header doc plot build symbols c valgrind asan bullet examples install
+STAGES := format clippy rust header doc plot build symbols c valgrind asan bullet examples install viewer
 
 .PHONY: test check
 test: ## run every check, with a summary and times
@@ -198,6 +209,11 @@ test-install: build
 	@CC='$(CC)' CXX='$(CXX)' PKG_CONFIG='$(PKG_CONFIG)' STATIC_LIBS='$(STATIC_LIBS)' VERSION='$(VERSION)' \
 		TARGET='$(TARGET)' WORK='$(WORK)/install-test' MAKE='$(MAKE)' tests/install/run.sh
 
+test-viewer:
+	cd tools/viewer && $(CARGO) fmt --check && \
+		$(CARGO) clippy --release --all-targets --target-dir '$(TARGET)/viewer' -- -D warnings && \
+		$(CARGO) test --release --target-dir '$(TARGET)/viewer'
+
 comma := ,
 
 .PHONY: extremes
@@ -221,6 +237,10 @@ count: ## what a scene pays for what it uses: bytes a body, instructions a step 
 .PHONY: workers
 workers: ## how much faster two workers are (needs two idle cores)
 	$(CARGO) test --release --test workers -- --ignored --nocapture
+
+.PHONY: recording
+recording: ## ten seconds of a loaf of a thousand particles: bytes and times of its recording (takes minutes)
+	$(CARGO) test --release --test recording -- --ignored --nocapture
 
 .PHONY: trade
 trade: ## exactness against time over all that can be set, into docs/trade.md, CSV and SVG (takes minutes)

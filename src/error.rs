@@ -31,6 +31,12 @@ pub enum Error {
     /// Bytes are not a snapshot that this library can restore: damaged, cut short, or of another format.
     #[error("the snapshot is refused: {0}")]
     Snapshot(String),
+    /// Bytes are not a recording that this library can play: damaged, cut short, or of another format.
+    #[error("the recording is refused: {0}")]
+    Recording(String),
+    /// The stream of a recording took no more.
+    #[error("the recording's stream failed {0}")]
+    Stream(String),
 }
 
 /// Shorthand used throughout the library.

@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use isocoat::capi::{
-    body, buffer, draw, handle, link, math, mesh, motion, piece, query, report, skeleton, spring, substance, world,
+    body, buffer, draw, handle, link, math, mesh, motion, piece, query, recording, report, skeleton, spring, substance,
+    world,
 };
 
 const WARNINGS: &[&str] =
@@ -190,6 +191,7 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
         query::isocoat_surface_point { position, normal, distance, link, skeleton }
         mesh::isocoat_mesh_desc { struct_size, deformation, cell_size }
         mesh::isocoat_mesh_view { positions, normals, triangles, valid, vertex_count, triangle_count }
+        recording::isocoat_recorder_desc { struct_size, key_interval, context, write }
         draw::isocoat_debug_draw { struct_size, flags, context, draw_line, draw_point }
     }
 }

@@ -26,6 +26,7 @@ const SECTIONS: &[(&str, &str)] = &[
     ("tasks", "Threads of the host"),
     ("report", "What a step reports"),
     ("snapshot", "Snapshots"),
+    ("recording", "Recordings"),
     ("query", "Queries"),
     ("mesh", "Meshes"),
     ("volume", "Volumes"),

@@ -1,12 +1,14 @@
 /*
  * A clover falls down a staircase: three leaves and a stem, four points in one soft coat on one rigid link. With a
- * folder as argument it leaves pictures there. Exits 0 when nothing ever presses through half of the coat, when the
- * clover lies still at the foot of the stairs in the end, and when no flight has more energy than the flight before.
+ * folder as argument it leaves pictures there, with --record FILE a recording. Exits 0 when nothing ever presses
+ * through half of the coat, when the clover lies still at the foot of the stairs in the end, and when no flight has
+ * more energy than the flight before.
  */
 #include <isocoat/isocoat.h>
 
 #include "../common/check.h"
 #include "../common/picture.h"
+#include "../common/record.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -122,6 +124,8 @@ static double speed_of(const isocoat_link_state *state)
 
 int main(int count, char **arguments)
 {
+    recording film;
+    if (record_begin(&film, record_argument(&count, arguments))) return 1;
     isocoat_world_desc world_desc = isocoat_world_desc_default();
     world_desc.gravity[2] = -GRAVITY;
     isocoat_world *world = NULL;
@@ -150,6 +154,7 @@ int main(int count, char **arguments)
             snprintf(path, sizeof path, "%s/clover%02d.ppm", arguments[1], tick / 10);
             if (picture_write(world, &view, UINT64_MAX, 480, 360, path)) return 1;
         }
+        if (record_frame(&film, world, tick * STEP)) return 1;
         CHECK(isocoat_world_step(world, STEP));
         CHECK(isocoat_link_get_state(world, clover, &state));
 
@@ -179,6 +184,7 @@ int main(int count, char **arguments)
     printf("%d flights; energy %.4f J at first, %.4f J in the last of them, gained at most %.1e J\n"
            "half through the coat %d times; in the end no faster than %.1e m/s\n",
            flights, start, flight, gained, (int)through, speed);
+    if (record_end(&film)) return 1;
     isocoat_world_destroy(world);
     return flights >= 3 && gained < 1e-6 * start && through == 0 && speed < 2e-3 &&
                    state.pose.position[0] > STAIRS * DEPTH

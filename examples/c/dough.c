@@ -2,12 +2,14 @@
  * Two lumps of clay on a table are pressed together by two plates that the host drives, held for a while, and pulled
  * apart again by their ends. Where the pressure between them is above the threshold of the clay, they fuse little by
  * little and are one lump; with a threshold that is never met they only lean on each other. Both are shown. With a
- * folder as argument it leaves pictures there. Exits 0 when the first is one piece in the end and the second two.
+ * folder as argument it leaves pictures there, with --record FILE a recording. Exits 0 when the first is one piece in
+ * the end and the second two.
  */
 #include <isocoat/isocoat.h>
 
 #include "../common/check.h"
 #include "../common/picture.h"
+#include "../common/record.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -164,8 +166,10 @@ static int measure(const isocoat_world *world, isocoat_body clay, isocoat_link p
 }
 
 /* Gives the number of pieces in the end. */
-static int run(const char *name, double fusion_threshold, const char *folder, size_t *pieces)
+static int run(const char *name, double fusion_threshold, const char *folder, const char *record, size_t *pieces)
 {
+    recording film;
+    if (record_begin(&film, record)) return 1;
     isocoat_world_desc world_desc = isocoat_world_desc_default();
     world_desc.gravity[2] = -GRAVITY;
     isocoat_world *world = NULL;
@@ -196,6 +200,7 @@ static int run(const char *name, double fusion_threshold, const char *folder, si
             snprintf(path, sizeof path, "%s/%s%02d.ppm", folder, name, tick / 30);
             if (picture_write(world, &view, UINT64_MAX, 320, 200, path)) return 1;
         }
+        if (record_frame(&film, world, time)) return 1;
         if (tick == (int)lround(END / STEP)) break;
         if (move_plates(world, plates, time)) return 1;
         if (time >= RELEASED) {
@@ -206,6 +211,7 @@ static int run(const char *name, double fusion_threshold, const char *folder, si
         CHECK(isocoat_world_step(world, STEP));
     }
     *pieces = now.pieces;
+    if (record_end(&film)) return 1;
     free(speeds);
     free(places);
     free(names);
@@ -215,9 +221,9 @@ static int run(const char *name, double fusion_threshold, const char *folder, si
 
 int main(int count, char **arguments)
 {
-    const char *folder = count > 1 ? arguments[1] : NULL;
+    const char *record = record_argument(&count, arguments), *folder = count > 1 ? arguments[1] : NULL;
     size_t fused = 0, apart = 0;
-    if (run("fused", 300.0, folder, &fused) || run("apart", INFINITY, folder, &apart)) return 1;
+    if (run("fused", 300.0, folder, record, &fused) || run("apart", INFINITY, folder, NULL, &apart)) return 1;
     printf("%d piece(s) with a threshold that is met, %d without\n", (int)fused, (int)apart);
     return fused == 1 && apart == 2 ? 0 : 1;
 }

@@ -1,13 +1,14 @@
 /*
  * A cube of jelly falls on its corner: 64 point masses, each with a coat, held together by springs along edges and
- * across faces and cells. With a folder as argument it leaves pictures there. Exits 0 when there is never more energy
- * than at the start, when the cube lies still in the end with the ground carrying its weight, and when no edge is off
- * by 5 % then.
+ * across faces and cells. With a folder as argument it leaves pictures there, with --record FILE a recording. Exits 0
+ * when there is never more energy than at the start, when the cube lies still in the end with the ground carrying its
+ * weight, and when no edge is off by 5 % then.
  */
 #include <isocoat/isocoat.h>
 
 #include "../common/check.h"
 #include "../common/picture.h"
+#include "../common/record.h"
 
 #include <stdio.h>
 
@@ -137,6 +138,8 @@ static int measure(const isocoat_world *world, const jelly *cube, figures *now)
 
 int main(int count, char **arguments)
 {
+    recording film;
+    if (record_begin(&film, record_argument(&count, arguments))) return 1;
     isocoat_world_desc world_desc = isocoat_world_desc_default();
     world_desc.gravity[2] = -GRAVITY;
     isocoat_world *world = NULL;
@@ -159,6 +162,7 @@ int main(int count, char **arguments)
             snprintf(path, sizeof path, "%s/jelly%02d.ppm", arguments[1], tick / 5);
             if (picture_write(world, &view, UINT64_MAX, 320, 320, path)) return 1;
         }
+        if (record_frame(&film, world, tick * STEP)) return 1;
         if (tick == (int)lround(SECONDS / STEP)) break;
         CHECK(isocoat_world_step(world, STEP));
         if (measure(world, &cube, &now)) return 1;
@@ -167,6 +171,7 @@ int main(int count, char **arguments)
     }
     printf("energy %.4f J at first, never above %.4f J; edges off by up to %.1f %% on the way, %.1f %% at rest\n",
            start, highest, 100.0 * most, 100.0 * now.strain);
+    if (record_end(&film)) return 1;
     isocoat_world_destroy(world);
     return highest <= start * (1.0 + 1e-9) && now.fastest < 1e-3 && fabs(now.carried - 1.0) < 1e-2 && now.strain < 0.05
                ? 0

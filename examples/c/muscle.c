@@ -1,13 +1,15 @@
 /*
  * An arm flexes: bones of the upper arm and of the forearm and a biceps of points, all in one coat that keeps the
  * volume of each of its parts. The target volume of the biceps doubles while the elbow bends, and returns. With a
- * folder as argument it leaves pictures there. Exits 0 when half a second after its target came to rest the biceps has
- * it, within 2 %, both times, and when in the end its neighbours have the volume that they began with, within 3 %.
+ * folder as argument it leaves pictures there, with --record FILE a recording. Exits 0 when half a second after its
+ * target came to rest the biceps has it, within 2 %, both times, and when in the end its neighbours have the volume
+ * that they began with, within 3 %.
  */
 #include <isocoat/isocoat.h>
 
 #include "../common/check.h"
 #include "../common/picture.h"
+#include "../common/record.h"
 
 #include <stdio.h>
 
@@ -69,6 +71,8 @@ static int measure(const isocoat_world *world, const isocoat_skeleton parts[PART
 
 int main(int count, char **arguments)
 {
+    recording film;
+    if (record_begin(&film, record_argument(&count, arguments))) return 1;
     const isocoat_world_desc world_desc = isocoat_world_desc_default();
     isocoat_world *world = NULL;
     CHECK(isocoat_world_create(&world_desc, &world));
@@ -118,6 +122,7 @@ int main(int count, char **arguments)
         state.angular_velocity[1] = -BEND * (flexion(time + STEP) - flex) / STEP;
         CHECK(isocoat_link_set_state(world, forearm, &state));
         CHECK(isocoat_world_step(world, STEP));
+        if (record_frame(&film, world, time)) return 1;
 
         if (measure(world, parts, now)) return 1;
         for (int k = 0; k < 4; ++k) {
@@ -142,6 +147,7 @@ int main(int count, char **arguments)
     }
     printf("%.1f s after its target came to rest the biceps is off by at most %.3f %%; in the end its neighbours by "
            "%.3f %%\n", HOLD, 100.0 * error, 100.0 * neighbours);
+    if (record_end(&film)) return 1;
     isocoat_world_destroy(world);
     return error < 0.02 && neighbours < 0.03 ? 0 : 1;
 }

@@ -1,12 +1,14 @@
 /*
  * Meshes of soft bodies that press on each other: a limb of three skeletons lies on a ball, and a finger pushes into
  * it. The watertight meshes, and those of the territories in both styles. With a folder as argument it leaves pictures
- * there, and the watertight meshes as skin.obj. Exits 0 when every watertight mesh is closed, by Euler's formula.
+ * there, and the watertight meshes as skin.obj; with --record FILE, a recording of one frame. Exits 0 when every
+ * watertight mesh is closed, by Euler's formula.
  */
 #include <isocoat/isocoat.h>
 
 #include "../common/check.h"
 #include "../common/raster.h"
+#include "../common/record.h"
 
 #include <stdio.h>
 
@@ -107,9 +109,12 @@ int main(int count, char **arguments)
     isocoat_world *world = NULL;
     isocoat_mesh *mesh = NULL;
     isocoat_body bodies[BODIES];
+    recording film;
+    if (record_begin(&film, record_argument(&count, arguments))) return 1;
     CHECK(isocoat_world_create(&desc, &world));
     CHECK(isocoat_mesh_create(&mesh));
     if (add_bodies(world, bodies)) return 1;
+    if (record_frame(&film, world, 0.0) || record_end(&film)) return 1;
     if (count < 2) {
         if (skins(world, bodies, 0.2 * THICKNESS, mesh, NULL, NULL)) return 1;
     }

@@ -1,7 +1,7 @@
 // A character falls on its side down three stairs, as in Fig. 14 of the paper: fifteen rigid bodies of Bullet's on
 // cone-twist joints and hinges, one coat that blends at the joints and collides with itself everywhere else.
 //
-//     bullet_character [folder for pictures]
+//     bullet_character [folder for pictures] [--record FILE]
 //
 // Exits with 0 when it has touched itself on the way and lies on the stairs at the end. It does not lie quite still:
 // its joints are Bullet's, solved apart from the contacts, and with many limbs touching, each one's load through them is an
@@ -19,6 +19,7 @@
 #include <isocoat_bullet.hpp>
 
 #include "../common/picture.h"
+#include "../common/record.h"
 #include "character.hpp"
 #include "character_bullet.hpp"
 
@@ -27,6 +28,8 @@ constexpr int frames = 1800, settled = 600;
 
 int main(int argc, char **argv) {
     try {
+        recording film;
+        if (record_begin(&film, record_argument(&argc, argv))) throw std::runtime_error("cannot record");
         character::fall scene;
         const picture_view view = {{3.2, -5.2, 2.9}, {0.6, 0.0, 0.6}, {0, 0, 1}, 4.2};
         int most = 0, pictures = 0;
@@ -36,6 +39,9 @@ int main(int argc, char **argv) {
             const auto begin = std::chrono::steady_clock::now();
             scene.advance();
             seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+            if (frame < settled && record_frame(&film, scene.coats.get(), scene.time())) {
+                throw std::runtime_error("cannot record");
+            }
             const int now = scene.self_contacts();
             most = std::max(most, now);
             for (std::size_t limb = 0; frame == settled && limb < scene.size(); ++limb) {
@@ -57,6 +63,7 @@ int main(int argc, char **argv) {
                 std::fflush(stdout);
             }
         }
+        if (record_end(&film)) throw std::runtime_error("cannot record");
         std::printf("%d contacts with itself at most; in the last %d s no limb faster than %.1f mm/s, none farther than "
                     "%.2f mm from where it was; %.1f ms a frame\n",
                     most, (frames - settled) / 60, 1e3 * unrest, 1e3 * drift, 1e3 * seconds / frames);

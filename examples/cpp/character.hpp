@@ -68,18 +68,25 @@ inline isocoat_body_desc flesh() {
     return desc;
 }
 
-/// A skeleton along a limb, in a frame at the limb's middle with the axes that the character stands in.
-inline isocoat_skeleton_desc skeleton_of(const limb &part) {
-    isocoat_skeleton_desc desc = isocoat_skeleton_desc_default();
+/// Gives the link of a limb its coat: a skeleton along it, and the head a neck. The link's frame is at the limb's middle
+/// and has the axes that the character stands in.
+inline void dress(isocoat::link link, const limb &part) {
     const isocoat::vec3 center = middle(part);
-    desc.shape = ISOCOAT_SHAPE_SEGMENT;
-    for (int k = 0; k < 3; ++k) {
-        desc.points[0][k] = part.from[k] - center[k];
-        desc.points[1][k] = part.to[k] - center[k];
+    const auto add = [&](const isocoat::vec3 &from, const isocoat::vec3 &to, double thickness) {
+        isocoat_skeleton_desc desc = isocoat_skeleton_desc_default();
+        desc.shape = ISOCOAT_SHAPE_SEGMENT;
+        for (int k = 0; k < 3; ++k) {
+            desc.points[0][k] = from[k] - center[k];
+            desc.points[1][k] = to[k] - center[k];
+        }
+        desc.thickness = thickness;
+        desc.radius = 2.2 * thickness;
+        link.create_skeleton(desc);
+    };
+    add(part.from, part.to, part.thickness);
+    if (std::string(part.name) == "head") {
+        add({0, 0, 1.44}, {0, 0, 1.56}, 0.05);
     }
-    desc.thickness = part.thickness;
-    desc.radius = 2.2 * part.thickness;
-    return desc;
 }
 
 /// Lets joined limbs blend, and all others collide.

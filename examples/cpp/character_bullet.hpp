@@ -139,7 +139,7 @@ private:
             // The capsule is there for the moments of inertia: no shape of the character's ever collides.
             btRigidBody &body = add(part.mass, std::make_unique<btCapsuleShapeZ>(btScalar(part.thickness), along.length()), center);
             isocoat::link link = skin.create_link(isocoat::bullet::link_desc_from(body));
-            link.create_skeleton(skeleton_of(part));
+            dress(link, part);
             coupler_.attach(&body, link.raw());
             body.setDamping(btScalar(0.05), btScalar(0.3));
             links_.push_back(link);

@@ -1,7 +1,7 @@
 // A character walks through a heap of loose, soft balls and pushes them aside. The host animates it: every limb is a
 // kinematic link, whose pose and velocities the host sets in each tick, whatever happens; the balls are isocoat's own.
 //
-//     walk [folder for pictures]
+//     walk [folder for pictures] [--record FILE]
 //
 // Exits with 0 when enough balls were moved, none is in the ground or in a limb, and all lie still in the end.
 #include <algorithm>
@@ -19,6 +19,7 @@
 #include <isocoat/isocoat.hpp>
 
 #include "../common/picture.h"
+#include "../common/record.h"
 #include "character.hpp"
 
 namespace {
@@ -95,7 +96,7 @@ public:
             const vec3 center = plus(character::middle(part), root_);
             std::copy(center.begin(), center.end(), desc.pose.position);
             links.push_back(skin.create_link(desc));
-            links.back().create_skeleton(character::skeleton_of(part));
+            character::dress(links.back(), part);
             links_.push_back(links.back().raw());
         }
         character::join(skin, links);
@@ -266,7 +267,9 @@ std::vector<ball> heap(isocoat::world &world) {
     return balls;
 }
 
-int run(const char *folder) {
+int run(const char *folder, const char *record) {
+    recording film;
+    if (record_begin(&film, record)) throw std::runtime_error("cannot record");
     isocoat_world_desc settings = isocoat_world_desc_default();
     settings.gravity[2] = -9.81;
     settings.force_tolerance = 5e-2;
@@ -299,6 +302,8 @@ int run(const char *folder) {
         // The step has moved the balls on and left the character to its host: look at both at the same moment.
         character.advance(time);
         character.tell();
+
+        if (record_frame(&film, world.get(), time)) throw std::runtime_error("cannot record");
 
         moved = 0;
         double fastest = 0.0;
@@ -343,6 +348,7 @@ int run(const char *folder) {
                 "the character's field was %.2f in a centre at most; it touched itself in %d frames\n"
                 "%.2f ms a frame, the slowest %.1f ms\n",
                 moved, balls.size(), still_since, lowest, deepest, touched_itself, 1e3 * total / frames, 1e3 * slowest);
+    if (record_end(&film)) throw std::runtime_error("cannot record");
     const bool intact = finite && lowest > 0.8 && inside < 0.5;
     return intact && moved >= 15 && still_since < all - 1.0 && touched_itself > 0 ? 0 : 1;
 }
@@ -351,7 +357,8 @@ int run(const char *folder) {
 
 int main(int argc, char **argv) {
     try {
-        return run(argc > 1 ? argv[1] : nullptr);
+        const char *record = record_argument(&argc, argv);
+        return run(argc > 1 ? argv[1] : nullptr, record);
     } catch (const std::exception &error) {
         std::fprintf(stderr, "%s\n", error.what());
         return 1;

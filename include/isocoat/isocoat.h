@@ -93,6 +93,10 @@ typedef uint32_t isocoat_status;
 #define ISOCOAT_ERROR_POISONED 8u
 /** The bytes are not a snapshot that this library can restore: damaged, cut short, or of another format. */
 #define ISOCOAT_ERROR_SNAPSHOT 9u
+/** The bytes are not a recording that this library can play: damaged, cut short, or of another format. */
+#define ISOCOAT_ERROR_RECORDING 10u
+/** The stream of a recording took no more. */
+#define ISOCOAT_ERROR_STREAM 11u
 
 /**
  * The message of the last call on this thread that did not return ISOCOAT_OK: what was wrong, with the value and the
@@ -1952,6 +1956,210 @@ isocoat_status isocoat_world_snapshot(const isocoat_world *world,
  */
 ISOCOAT_MUST_USE isocoat_status isocoat_world_restore(isocoat_world *world, const uint8_t *buffer, size_t size);
 
+/* ---- Recordings -------------------------------------------------------------------------------------------------- */
+
+/** A recording to be played, and the world that shows one of its frames. */
+typedef struct isocoat_playback isocoat_playback;
+
+/** A recording under way. It belongs to no world, and outlives them. */
+typedef struct isocoat_recorder isocoat_recorder;
+
+/**
+ * Takes the next bytes of a recording, as a file would.
+ *
+ * - context: as in isocoat_recorder_desc.
+ * - bytes: the bytes; valid during the call.
+ * - size: how many.
+ *
+ * Returns whether it took them all; after it has not, the recording can only be destroyed. It must return (no longjmp,
+ * no exception). It may read the world, but not change it.
+ */
+typedef bool (*isocoat_write_fn)(void *context, const uint8_t *bytes, size_t size);
+
+/** How to record. Begin with isocoat_recorder_desc_default(). */
+typedef struct isocoat_recorder_desc {
+    /** Size of this struct in bytes, as the host knows it. */
+    uint32_t struct_size;
+    /**
+     * Every how many frames one is written by itself, from 1 to 65536: to go to any frame, at most so many are read.
+     * Default 60.
+     */
+    uint32_t key_interval;
+    /** Given to write, otherwise unused. Default NULL. */
+    void *context;
+    /** Takes the bytes as they come; NULL keeps them in memory, for isocoat_recorder_get_bytes. Default NULL. */
+    isocoat_write_fn write;
+} isocoat_recorder_desc;
+
+/**
+ * Fills a descriptor with its defaults; isocoat_recorder_desc_default() calls it.
+ *
+ * - desc: receives at most size bytes, its struct_size among them; not NULL.
+ * - size: sizeof(isocoat_recorder_desc) as the host was compiled.
+ *
+ * Errors: INVALID_ARGUMENT. Threads: any.
+ */
+isocoat_status isocoat_recorder_desc_init(isocoat_recorder_desc *desc, size_t size);
+
+/**
+ * Begins a recording.
+ *
+ * - desc: how to record; not NULL.
+ * - recorder: receives it; not NULL. Destroy it with isocoat_recorder_destroy.
+ *
+ * Errors: INVALID_ARGUMENT, OUT_OF_RANGE. Threads: any.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_recorder_create(const isocoat_recorder_desc *desc,
+                                       isocoat_recorder **recorder);
+
+/**
+ * Destroys a recorder. A recording to a stream that has not been finished is refused later as cut short.
+ *
+ * - recorder: NULL does nothing.
+ *
+ * Errors: LOCKED while another call uses it; it then lives on. Threads: the recorder by this thread alone.
+ */
+isocoat_status isocoat_recorder_destroy(isocoat_recorder *recorder);
+
+/**
+ * Takes a frame of a world as it is now: call it after each step, or as often as frames are wanted. A frame has what
+ * the surfaces of all bodies follow from, in contact and with bulges too; not velocities, forces, springs, contacts or
+ * what is at rest.
+ *
+ * - recorder: not NULL.
+ * - world: not NULL; the same for all frames.
+ * - time: when this is, in s, finite and not before the last frame.
+ *
+ * Errors: INVALID_ARGUMENT, OUT_OF_RANGE, UNSUPPORTED (it is finished, or its stream has failed), STREAM, CAPACITY,
+ * LOCKED; but for STREAM the recording is as it was. Threads: reads the world; the recorder by this thread alone.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_recorder_capture(isocoat_recorder *recorder,
+                                        const isocoat_world *world,
+                                        double time);
+
+/**
+ * How much has been recorded.
+ *
+ * - recorder: not NULL.
+ * - frame_count: receives the number of frames; not NULL.
+ * - size: receives the bytes so far, without the index; not NULL.
+ *
+ * Errors: INVALID_ARGUMENT, LOCKED. Threads: the recorder by this thread alone.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_recorder_get_size(const isocoat_recorder *recorder,
+                                         uint32_t *frame_count,
+                                         uint64_t *size);
+
+/**
+ * Ends a recording that goes to a stream: hands over the index, without which it is refused as cut short. Nothing can
+ * follow.
+ *
+ * - recorder: not NULL.
+ *
+ * Errors: INVALID_ARGUMENT, UNSUPPORTED (in memory, finished, or its stream has failed), STREAM, LOCKED. Threads: the
+ * recorder by this thread alone.
+ */
+ISOCOAT_MUST_USE isocoat_status isocoat_recorder_finish(isocoat_recorder *recorder);
+
+/**
+ * The recording in memory so far, whole: a file of these bytes can be played. It may go on afterwards.
+ *
+ * - recorder: not NULL.
+ * - buffer: receives the bytes, little endian on every machine; NULL with capacity 0 asks for the size only.
+ * - capacity: bytes in buffer.
+ * - size: receives the bytes of the recording, also when buffer is too small; not NULL.
+ *
+ * Errors: INVALID_ARGUMENT, BUFFER_TOO_SMALL, UNSUPPORTED (it goes to a stream), LOCKED. Threads: the recorder by this
+ * thread alone.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_recorder_get_bytes(const isocoat_recorder *recorder,
+                                          uint8_t *buffer,
+                                          size_t capacity,
+                                          size_t *size);
+
+/**
+ * Opens a recording and checks all of it.
+ *
+ * - bytes: the recording, which is copied; not NULL.
+ * - size: its bytes, neither more nor fewer.
+ * - playback: receives it; not NULL. Destroy it with isocoat_playback_destroy.
+ *
+ * Errors: INVALID_ARGUMENT, CAPACITY; RECORDING for what is damaged, cut short or of another format: the message says
+ * what is wrong and where. Threads: any.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_playback_create(const uint8_t *bytes,
+                                       size_t size,
+                                       isocoat_playback **playback);
+
+/**
+ * Destroys a playback with its world.
+ *
+ * - playback: NULL does nothing.
+ *
+ * Errors: LOCKED while its world is used; it then lives on. Threads: the playback by this thread alone.
+ */
+isocoat_status isocoat_playback_destroy(isocoat_playback *playback);
+
+/**
+ * Number of frames of a recording.
+ *
+ * - playback: not NULL.
+ * - frame_count: receives it; not NULL.
+ *
+ * Errors: INVALID_ARGUMENT, LOCKED. Threads: reads the playback's world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_playback_get_frame_count(const isocoat_playback *playback,
+                                                uint32_t *frame_count);
+
+/**
+ * When a frame was taken.
+ *
+ * - playback: not NULL.
+ * - frame: the frame, below the number of frames.
+ * - time: receives the time that it was captured with, in s; not NULL.
+ *
+ * Errors: INVALID_ARGUMENT, OUT_OF_RANGE, LOCKED. Threads: reads the playback's world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_playback_get_time(const isocoat_playback *playback,
+                                         uint32_t frame,
+                                         double *time);
+
+/**
+ * Shows a frame in the playback's world. The next frame is the cheapest; any other costs at most key_interval frames.
+ *
+ * - playback: not NULL.
+ * - frame: the frame, below the number of frames.
+ *
+ * Errors: INVALID_ARGUMENT, OUT_OF_RANGE, RECORDING, LOCKED while the world is used; the world then shows what it did.
+ * Threads: changes the playback's world.
+ */
+ISOCOAT_MUST_USE isocoat_status isocoat_playback_seek(isocoat_playback *playback, uint32_t frame);
+
+/**
+ * The world that shows a frame of a recording, to be asked everything that needs no step: rays, fields, closest points,
+ * meshes, pieces. It is at rest, without springs, contacts or events, and nobody can change it: calls that would give
+ * UNSUPPORTED. A snapshot of it, restored in a world of the host's own, steps on from there. Before the first
+ * isocoat_playback_seek it is empty.
+ *
+ * - playback: not NULL.
+ * - world: receives it; not NULL. It belongs to the playback, and lives as long.
+ *
+ * Handles stay valid from frame to frame while their objects are there; isocoat_world_get_bodies and the like give
+ * them. Their index and generation are those in the world that was recorded.
+ *
+ * Errors: INVALID_ARGUMENT. Threads: any.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_playback_get_world(const isocoat_playback *playback,
+                                          const isocoat_world **world);
+
 /* ---- Queries ----------------------------------------------------------------------------------------------------- */
 
 /**
@@ -2962,6 +3170,13 @@ static inline isocoat_mesh_desc isocoat_mesh_desc_default(void)
     return desc;
 }
 
+static inline isocoat_recorder_desc isocoat_recorder_desc_default(void)
+{
+    isocoat_recorder_desc desc;
+    isocoat_recorder_desc_init(&desc, sizeof desc);
+    return desc;
+}
+
 static inline isocoat_debug_draw isocoat_debug_draw_default(void)
 {
     isocoat_debug_draw draw;
@@ -2999,6 +3214,7 @@ ISOCOAT_MUST_USE static inline isocoat_status isocoat_check_abi(void)
         (uint32_t)sizeof(isocoat_change),
         (uint32_t)sizeof(isocoat_mesh_desc),
         (uint32_t)sizeof(isocoat_mesh_view),
+        (uint32_t)sizeof(isocoat_recorder_desc),
     };
     return isocoat_check_abi_of(ISOCOAT_VERSION, sizes, sizeof sizes / sizeof sizes[0]);
 }

@@ -868,8 +868,18 @@ private:
     };
 
     struct destroyer {
-        void operator()(isocoat_world *world) const noexcept { isocoat_world_destroy(world); }
+        bool owns;
+        destroyer() noexcept : owns(true) {}
+        explicit destroyer(bool owner) noexcept : owns(owner) {}
+        void operator()(isocoat_world *world) const noexcept
+        {
+            if (owns) isocoat_world_destroy(world);
+        }
     };
+
+    /* A look at a world that a playback owns. */
+    friend class playback;
+    explicit world(const isocoat_world *shown) : world_(const_cast<isocoat_world *>(shown), destroyer{false}) {}
 
     callbacks &keep_callbacks()
     {
@@ -880,6 +890,127 @@ private:
     /* After the callbacks, so that it goes before them. */
     std::unique_ptr<callbacks> callbacks_;
     std::unique_ptr<isocoat_world, destroyer> world_;
+};
+
+/* A recording under way. */
+class recorder {
+public:
+    /* Takes the next bytes of a recording; false, or throwing, ends it. */
+    using write_function = std::function<bool(span<const std::uint8_t> bytes)>;
+
+    /* In memory. A descriptor's own function is the host's business; prefer the other one. */
+    explicit recorder(const isocoat_recorder_desc &desc = isocoat_recorder_desc_default()) { create(desc); }
+    /* To a function. */
+    explicit recorder(write_function write, isocoat_recorder_desc desc = isocoat_recorder_desc_default())
+        : stream_(std::make_unique<stream>())
+    {
+        stream_->write = std::move(write);
+        desc.context = stream_.get();
+        desc.write = &stream::call;
+        create(desc);
+    }
+
+    isocoat_recorder *get() const noexcept { return recorder_.get(); }
+
+    /* Takes a frame at a time in s. What the function throws comes out of here, and of finish. */
+    void capture(const world &recorded, double time)
+    {
+        conclude(isocoat_recorder_capture(get(), recorded.get(), time));
+    }
+    std::uint32_t frame_count() const { return size().first; }
+    std::uint64_t byte_count() const { return size().second; }
+    /* Ends a recording to a function. */
+    void finish() { conclude(isocoat_recorder_finish(get())); }
+    /* The recording in memory so far, whole. */
+    std::vector<std::uint8_t> bytes() const
+    {
+        std::size_t size = 0;
+        check(isocoat_recorder_get_bytes(get(), nullptr, 0, &size));
+        std::vector<std::uint8_t> bytes(size);
+        check(isocoat_recorder_get_bytes(get(), bytes.data(), bytes.size(), &size));
+        return bytes;
+    }
+
+private:
+    struct stream {
+        write_function write;
+        std::exception_ptr thrown;
+
+        static bool call(void *context, const std::uint8_t *bytes, std::size_t size)
+        {
+            stream &self = *static_cast<stream *>(context);
+            try {
+                return self.write({bytes, size});
+            } catch (...) {
+                self.thrown = std::current_exception();
+                return false;
+            }
+        }
+    };
+    struct destroyer {
+        void operator()(isocoat_recorder *raw) const noexcept { isocoat_recorder_destroy(raw); }
+    };
+
+    void create(const isocoat_recorder_desc &desc)
+    {
+        isocoat_recorder *created = nullptr;
+        check(isocoat_recorder_create(&desc, &created));
+        recorder_.reset(created);
+    }
+    void conclude(isocoat_status status)
+    {
+        if (stream_ && stream_->thrown) std::rethrow_exception(std::exchange(stream_->thrown, nullptr));
+        check(status);
+    }
+    std::pair<std::uint32_t, std::uint64_t> size() const
+    {
+        std::pair<std::uint32_t, std::uint64_t> size;
+        check(isocoat_recorder_get_size(get(), &size.first, &size.second));
+        return size;
+    }
+
+    /* After the function, so that it goes before it. */
+    std::unique_ptr<stream> stream_;
+    std::unique_ptr<isocoat_recorder, destroyer> recorder_;
+};
+
+/* A recording, and the world that shows one of its frames. */
+class playback {
+public:
+    explicit playback(span<const std::uint8_t> bytes)
+    {
+        isocoat_playback *created = nullptr;
+        check(isocoat_playback_create(bytes.data(), bytes.size(), &created));
+        playback_.reset(created);
+        const isocoat_world *shown = nullptr;
+        check(isocoat_playback_get_world(created, &shown));
+        world_.reset(new isocoat::world(shown));
+    }
+
+    isocoat_playback *get() const noexcept { return playback_.get(); }
+
+    std::uint32_t frame_count() const
+    {
+        return detail::read(std::uint32_t{0}, isocoat_playback_get_frame_count, get());
+    }
+    /* When a frame was taken, in s. */
+    double time(std::uint32_t frame) const { return detail::read(0.0, isocoat_playback_get_time, get(), frame); }
+    /* Shows a frame. */
+    const isocoat::world &seek(std::uint32_t frame)
+    {
+        check(isocoat_playback_seek(get(), frame));
+        return world();
+    }
+    /* What shows it: it answers every question, refuses every change, and lives as long as the playback. */
+    const isocoat::world &world() const noexcept { return *world_; }
+
+private:
+    struct destroyer {
+        void operator()(isocoat_playback *raw) const noexcept { isocoat_playback_destroy(raw); }
+    };
+
+    std::unique_ptr<isocoat_playback, destroyer> playback_;
+    std::unique_ptr<isocoat::world> world_;
 };
 
 /* Inertia tensors of solids about their centres; see the C functions. */

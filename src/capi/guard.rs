@@ -14,13 +14,14 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use super::report::Views;
 use super::status::{
-    Checked, ISOCOAT_ERROR_LOCKED, ISOCOAT_ERROR_POISONED, ISOCOAT_OK, Refusal, isocoat_status, report,
+    Checked, ISOCOAT_ERROR_LOCKED, ISOCOAT_ERROR_POISONED, ISOCOAT_ERROR_UNSUPPORTED, ISOCOAT_OK, Refusal,
+    isocoat_status, report,
 };
 use crate::world::World;
 
 /// A world: it owns every body, link and skeleton; one step advances it. Worlds are independent of each other.
 pub struct isocoat_world {
-    /// Number of readers, and the two flags.
+    /// Number of readers, and the three flags.
     state: AtomicU32,
     inner: UnsafeCell<Inner>,
 }
@@ -33,11 +34,18 @@ pub(super) struct Inner {
 
 const WRITING: u32 = 1 << 31;
 const POISONED: u32 = 1 << 30;
-const READERS: u32 = POISONED - 1;
+/// It shows a frame of a recording: only the playback that it belongs to changes it.
+const SHOWN: u32 = 1 << 29;
+const READERS: u32 = SHOWN - 1;
 
 impl isocoat_world {
     pub(super) fn new(world: World) -> Self {
         Self { state: AtomicU32::new(0), inner: UnsafeCell::new(Inner { world, views: Views::default() }) }
+    }
+
+    /// A world that shows frames of a recording.
+    pub(super) fn new_shown(world: World) -> Self {
+        Self { state: AtomicU32::new(SHOWN), ..Self::new(world) }
     }
 
     /// Moves to the state that `next` says, unless the world is poisoned, or `next` finds it taken.
@@ -58,6 +66,10 @@ fn refusal(state: u32) -> Refusal {
             ISOCOAT_ERROR_LOCKED,
             "the world is being stepped or changed: no other call until that returns, not even from its callbacks",
         )
+    } else if state & SHOWN != 0 {
+        let message =
+            "the world shows a frame of a recording: it cannot be changed, but a snapshot of it can be restored";
+        Refusal::new(ISOCOAT_ERROR_UNSUPPORTED, message)
     } else {
         Refusal::new(ISOCOAT_ERROR_LOCKED, "the world is being read: it cannot be changed until that returns")
     }
@@ -99,14 +111,55 @@ pub(super) unsafe fn read(world: *const isocoat_world, call: impl FnOnce(&Inner)
 pub(super) unsafe fn write(world: *mut isocoat_world, call: impl FnOnce(&mut Inner) -> Checked<()>) -> isocoat_status {
     // SAFETY: NULL or live, as the caller promises.
     let Some(world) = (unsafe { world.as_ref() }) else { return report(null_world()) };
-    if let Err(refusal) = world.enter(|state| if state == 0 { Some(WRITING) } else { None }) {
+    let taken = world.enter(|state| if state == 0 { Some(WRITING) } else { None });
+    alone(world, taken, 0, call)
+}
+
+/// Guards a call by which a playback changes the world that it shows: it must be alone.
+pub(super) fn show(world: &isocoat_world, call: impl FnOnce(&mut Inner) -> Checked<()>) -> isocoat_status {
+    alone(world, take_shown(world), SHOWN, call)
+}
+
+/// Runs a call alone in a world that has been taken, and lets go of it.
+fn alone(
+    world: &isocoat_world,
+    taken: Checked<()>,
+    after: u32,
+    call: impl FnOnce(&mut Inner) -> Checked<()>,
+) -> isocoat_status {
+    if let Err(refusal) = taken {
         return report(refusal);
     }
     // SAFETY: the flag was taken with no reader present, so that this is the only reference until it is given back.
     let inner = unsafe { &mut *world.inner.get() };
     let result = catch(|| call(inner));
-    world.state.store(if result.is_err() { POISONED } else { 0 }, Ordering::Release);
+    world.state.store(if result.is_err() { POISONED | after } else { after }, Ordering::Release);
     conclude_or_poison(result)
+}
+
+fn take_shown(world: &isocoat_world) -> Checked<()> {
+    let idle = |state| if state == SHOWN { Some(SHOWN | WRITING) } else { None };
+    world.enter(idle).map_err(|refused| match refused.status {
+        // To its playback it is a world like any other.
+        ISOCOAT_ERROR_UNSUPPORTED => refusal(0),
+        _ => refused,
+    })
+}
+
+/// Lets `close` destroy what a world is part of that shows a recording, when nobody uses it.
+///
+/// # Safety
+/// `world` is live.
+pub(super) unsafe fn close_shown(world: *const isocoat_world, close: impl FnOnce()) -> isocoat_status {
+    // SAFETY: live, as the caller promises; not used any more after `close` has begun.
+    let state = unsafe { &(*world).state };
+    let idle = |state| if state & (WRITING | READERS) == 0 { Some(WRITING) } else { None };
+    if let Err(state) = state.fetch_update(Ordering::Acquire, Ordering::Relaxed, idle) {
+        return report(refusal(state & (WRITING | READERS)));
+    }
+    // A poisoned world may fail to come apart; what is left of it then leaks.
+    let _ = catch(close);
+    ISOCOAT_OK
 }
 
 /// Destroys a world that nobody uses, poisoned or not.

@@ -30,6 +30,10 @@ pub const ISOCOAT_ERROR_LOCKED: isocoat_status = 7;
 pub const ISOCOAT_ERROR_POISONED: isocoat_status = 8;
 /// The bytes are not a snapshot that this library can restore: damaged, cut short, or of another format.
 pub const ISOCOAT_ERROR_SNAPSHOT: isocoat_status = 9;
+/// The bytes are not a recording that this library can play: damaged, cut short, or of another format.
+pub const ISOCOAT_ERROR_RECORDING: isocoat_status = 10;
+/// The stream of a recording took no more.
+pub const ISOCOAT_ERROR_STREAM: isocoat_status = 11;
 
 /// A refused call: its code and its message.
 #[derive(Debug)]
@@ -65,6 +69,8 @@ impl From<Error> for Refusal {
             Error::Unsupported(_) => ISOCOAT_ERROR_UNSUPPORTED,
             Error::Capacity(_) => ISOCOAT_ERROR_CAPACITY,
             Error::Snapshot(_) => ISOCOAT_ERROR_SNAPSHOT,
+            Error::Recording(_) => ISOCOAT_ERROR_RECORDING,
+            Error::Stream(_) => ISOCOAT_ERROR_STREAM,
         };
         Self::new(status, error.to_string())
     }
@@ -125,6 +131,8 @@ pub extern "C" fn isocoat_status_name(status: isocoat_status) -> *const c_char {
         ISOCOAT_ERROR_LOCKED => c"ISOCOAT_ERROR_LOCKED",
         ISOCOAT_ERROR_POISONED => c"ISOCOAT_ERROR_POISONED",
         ISOCOAT_ERROR_SNAPSHOT => c"ISOCOAT_ERROR_SNAPSHOT",
+        ISOCOAT_ERROR_RECORDING => c"ISOCOAT_ERROR_RECORDING",
+        ISOCOAT_ERROR_STREAM => c"ISOCOAT_ERROR_STREAM",
         _ => c"unknown status",
     };
     name.as_ptr()

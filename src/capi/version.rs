@@ -81,6 +81,7 @@ const LAYOUTS: &[Layout] = &[
     fixed::<super::piece::isocoat_change>("isocoat_change"),
     growable::<super::mesh::isocoat_mesh_desc>(),
     fixed::<super::mesh::isocoat_mesh_view>("isocoat_mesh_view"),
+    growable::<super::recording::isocoat_recorder_desc>(),
 ];
 
 /// What isocoat_check_abi calls: compares a host's version and struct sizes with the library's.

@@ -176,16 +176,15 @@ impl Deformed {
         loop {
             // Before the first obstacle's field the coat is undeformed.
             let entries = self.obstacles.iter().filter_map(|obstacle| line.entry_into(&obstacle.coat, s, end));
-            let event = entries.fold(end, f64::min);
+            let entry = entries.reduce(f64::min);
+            let event = entry.unwrap_or(end);
             if let Some(hit) = ray::cast(&self.coat, &line.at(s), direction, event - s) {
                 // At the event itself the field may be deformed already.
-                if s + hit.distance < event || event >= end {
+                if s + hit.distance < event || entry.is_none() {
                     return Some(SurfaceHit { distance: (abreast + s + hit.distance).max(0.0), ..hit });
                 }
             }
-            if event >= end {
-                return None;
-            }
+            entry?;
             match self.march(&line, event, end) {
                 March::Hit(root) => return Some(self.hit(line.at(root), (abreast + root).max(0.0), &-direction)),
                 March::Out(at) => s = at,

@@ -14,7 +14,9 @@ mod gather;
 pub mod mesh;
 mod motion;
 pub mod query;
+pub mod recording;
 mod respond;
+pub mod sight;
 mod sleep;
 mod snapshot;
 mod springs;
@@ -31,6 +33,7 @@ pub use desc::{
 };
 pub use events::{Contact, Counters, Event, EventKind, LogLevel, Tally, Times};
 pub use motion::LinkState;
+pub use recording::{Playback, Recorder, RecorderDesc};
 pub use springs::{Spring, SpringState};
 pub use substance::{Change, Fill, Particle, ParticleId, Piece, SubstanceDesc};
 

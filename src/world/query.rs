@@ -115,7 +115,7 @@ impl World {
     }
 
     /// Bodies that take part and have a bit of the mask in their category, in the order of their ids.
-    fn bodies_of(&self, mask: u64) -> impl Iterator<Item = usize> + '_ {
+    pub(super) fn bodies_of(&self, mask: u64) -> impl Iterator<Item = usize> + '_ {
         self.bodies.indices().filter(move |index| {
             let body = &self.bodies[*index];
             body.enabled && body.desc.category & mask != 0
@@ -204,45 +204,32 @@ impl World {
         mask: u64,
         deformation: Deformation,
     ) -> Result<Option<RayHit>> {
-        require_finite("ray origin", origin)?;
-        require_finite("ray direction", direction)?;
-        // Scaled first, so that no square overflows or vanishes.
-        let largest = direction.amax();
-        require("length of the ray direction", largest, "> 0", |x| x > 0.0)?;
-        if max_distance.is_nan() || max_distance < 0.0 {
-            return Err(out_of_range("max_distance", max_distance, "at least 0 (infinity is fine)"));
-        }
-        let direction = (direction / largest).normalize();
-        let mut length = max_distance;
-        let mut first = None;
-        for body in self.bodies_of(mask) {
+        let hit_of = |body: usize, direction: &Vec3, length: f64| {
             let posed = self.posed_coat(body);
             let local = posed.localise(origin);
             let hit = if deformation == Deformation::None {
-                ray::cast(&posed.coat, &local, &direction, length)
-            } else if ray::enters(&posed.coat, &local, &direction, length) {
-                self.deformed_coat(body, deformation).0.cast(&local, &direction, length)
+                ray::cast(&posed.coat, &local, direction, length)
+            } else if ray::enters(&posed.coat, &local, direction, length) {
+                self.deformed_coat(body, deformation).0.cast(&local, direction, length)
             } else {
                 None
             };
-            let Some(hit) = hit else { continue };
-            if first.is_none() || hit.distance < length {
-                length = hit.distance;
-                let (skeleton, link) = self.skeleton_and_link(&posed.skeletons, hit.skeleton);
-                first = Some(RayHit {
-                    body: self.bodies.id_of(body),
-                    link,
-                    skeleton,
-                    distance: hit.distance,
-                    position: posed.globalise(&hit.position),
-                    normal: hit.normal,
-                });
-            }
-            if length == 0.0 {
-                break;
-            }
+            Some(self.ray_hit(body, &posed.coat.origin, &posed.skeletons, hit?))
+        };
+        first_hit(origin, direction, max_distance, self.bodies_of(mask), hit_of)
+    }
+
+    /// A hit of a body, whose coat is in a frame at `origin`, as the world has it.
+    pub(super) fn ray_hit(&self, body: usize, origin: &Vec3, skeletons: &[usize], hit: SurfaceHit) -> RayHit {
+        let (skeleton, link) = self.skeleton_and_link(skeletons, hit.skeleton);
+        RayHit {
+            body: self.bodies.id_of(body),
+            link,
+            skeleton,
+            distance: hit.distance,
+            position: hit.position + origin,
+            normal: hit.normal,
         }
-        Ok(first)
     }
 
     /// Bodies whose coat comes within `radius` \[m\] of a point (with radius 0: that contain it), among enabled bodies
@@ -313,6 +300,38 @@ impl World {
         territory::seeds(&posed.coat, index, &rays, &mut followed.seeds);
         Ok(followed)
     }
+}
+
+/// The first hit of a ray among bodies, in the order of their ids; `hit_of` casts it, with a unit direction.
+pub(super) fn first_hit<B>(
+    origin: &Vec3,
+    direction: &Vec3,
+    max_distance: f64,
+    bodies: impl Iterator<Item = B>,
+    hit_of: impl Fn(B, &Vec3, f64) -> Option<RayHit>,
+) -> Result<Option<RayHit>> {
+    require_finite("ray origin", origin)?;
+    require_finite("ray direction", direction)?;
+    // Scaled first, so that no square overflows or vanishes.
+    let largest = direction.amax();
+    require("length of the ray direction", largest, "> 0", |x| x > 0.0)?;
+    if max_distance.is_nan() || max_distance < 0.0 {
+        return Err(out_of_range("max_distance", max_distance, "at least 0 (infinity is fine)"));
+    }
+    let direction = (direction / largest).normalize();
+    let mut length = max_distance;
+    let mut first = None;
+    for body in bodies {
+        let Some(hit) = hit_of(body, &direction, length) else { continue };
+        if first.is_none() || hit.distance < length {
+            length = hit.distance;
+            first = Some(hit);
+        }
+        if length == 0.0 {
+            break;
+        }
+    }
+    Ok(first)
 }
 
 /// The rays of a skeleton, followed to their ends.

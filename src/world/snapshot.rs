@@ -211,7 +211,8 @@ impl Lasting for Shape {
     }
 }
 
-fn write_arena<T: Noun + Lasting>(arena: &Arena<T>, out: &mut impl Sink) {
+/// Writes the objects of an arena, each as `write` does, with their slots.
+pub(super) fn write_arena<T: Noun, S: Sink>(arena: &Arena<T>, out: &mut S, write: impl Fn(&T, &mut S)) {
     let (slots, free, given) = arena.parts();
     (slots.len() as u32).write(out);
     for (Slot { generation, value }, given) in slots.iter().zip(given) {
@@ -219,7 +220,7 @@ fn write_arena<T: Noun + Lasting>(arena: &Arena<T>, out: &mut impl Sink) {
         generation.write(out);
         value.is_some().write(out);
         if let Some(value) = value {
-            value.write(out);
+            write(value, out);
         }
     }
     write_list(free.len(), free.iter(), out);
@@ -237,6 +238,25 @@ fn read_arena<T: Noun + Lasting>(from: &mut Reader) -> Result<Arena<T>> {
     }
     let free = from.read("free slots")?;
     Arena::from_parts(0, slots, free, given).map_err(|error| refused(T::NAME, error))
+}
+
+/// A world of the settings and the objects that come next; nothing of it is checked.
+pub(super) fn read_parts(from: &mut Reader) -> Result<World> {
+    Ok(World {
+        origin: new_origin(),
+        // For a world of another origin; otherwise it goes back at once.
+        own_tag: WorldTag::take()?,
+        desc: from.read("settings")?,
+        bodies: read_arena(from)?,
+        links: read_arena(from)?,
+        skeletons: read_arena(from)?,
+        springs: read_arena(from)?,
+        log: Alone::default(),
+        pair_filter: Alone::default(),
+        tasks: Alone::default(),
+        controls_volumes: false,
+        stepping: step::Stepping::default(),
+    })
 }
 
 /// A number that no other world has, in no other process either.
@@ -301,10 +321,10 @@ impl World {
         } = self;
         origin.write(out);
         desc.write(out);
-        write_arena(bodies, out);
-        write_arena(links, out);
-        write_arena(skeletons, out);
-        write_arena(springs, out);
+        write_arena(bodies, out, Body::write);
+        write_arena(links, out, Link::write);
+        write_arena(skeletons, out, Skeleton::write);
+        write_arena(springs, out, Spring::write);
         let (candidates, resting, contacts) = stepping.lasting();
         write_list(candidates.len(), candidates.iter().map(|candidate| candidate.lasting()), out);
         write_list(resting.len(), resting.iter(), out);
@@ -326,21 +346,8 @@ impl World {
     /// generations, and [`World::bodies`], [`World::body_links`] and [`World::link_skeletons`] list them.
     pub fn restore(&mut self, snapshot: &[u8]) -> Result<()> {
         let mut from = open(snapshot)?;
-        let mut fresh = World {
-            origin: from.read("origin")?,
-            // For a world of another origin; otherwise it goes back at once.
-            own_tag: WorldTag::take()?,
-            desc: from.read("settings")?,
-            bodies: read_arena(&mut from)?,
-            links: read_arena(&mut from)?,
-            skeletons: read_arena(&mut from)?,
-            springs: read_arena(&mut from)?,
-            log: Alone::default(),
-            pair_filter: Alone::default(),
-            tasks: Alone::default(),
-            controls_volumes: false,
-            stepping: step::Stepping::default(),
-        };
+        let origin = from.read("origin")?;
+        let mut fresh = World { origin, ..read_parts(&mut from)? };
         let mut memories: Vec<Memory> = from.read("pairs of bodies")?;
         let mut resting: Vec<Memory> = from.read("pairs of bodies asleep")?;
         let mut contacts: Vec<Contact> = from.read("contacts of bodies asleep")?;
@@ -366,6 +373,24 @@ impl World {
             std::mem::swap(&mut self.own_tag, &mut fresh.own_tag);
             self.own_tag.number()
         };
+        for id in memories.iter_mut().chain(&mut resting).flat_map(|memory| &mut memory.ids) {
+            id.world = tag;
+        }
+        for Contact { bodies, links, skeletons, .. } in &mut contacts {
+            bodies.iter_mut().for_each(|id| id.raw.world = tag);
+            links.iter_mut().for_each(|id| id.raw.world = tag);
+            skeletons.iter_mut().for_each(|id| id.raw.world = tag);
+        }
+        self.origin = fresh.origin;
+        self.take_over(fresh);
+        self.stepping.restart(memories, resting, contacts);
+        Ok(())
+    }
+
+    /// Puts the objects of another world, which are sound, in the place of all there was. They are this world's now; log,
+    /// pair filter and tasks stay.
+    pub(super) fn take_over(&mut self, mut fresh: World) {
+        let tag = self.own_tag.number();
         fresh.bodies.set_world(tag);
         fresh.links.set_world(tag);
         fresh.skeletons.set_world(tag);
@@ -375,19 +400,10 @@ impl World {
                 spring.desc.links.iter_mut().for_each(|id| id.raw.world = tag);
             }
         }
-        for id in memories.iter_mut().chain(&mut resting).flat_map(|memory| &mut memory.ids) {
-            id.world = tag;
-        }
-        for Contact { bodies, links, skeletons, .. } in &mut contacts {
-            bodies.iter_mut().for_each(|id| id.raw.world = tag);
-            links.iter_mut().for_each(|id| id.raw.world = tag);
-            skeletons.iter_mut().for_each(|id| id.raw.world = tag);
-        }
         fresh.take_rays_of(self);
-        fresh.controls_volumes = fresh.bodies.indices().any(|body| fresh.bodies[body].desc.volume_gain > 0.0);
         let World {
             desc,
-            origin,
+            origin: _,
             own_tag: _,
             bodies,
             links,
@@ -396,18 +412,16 @@ impl World {
             log: _,
             pair_filter: _,
             tasks: _,
-            controls_volumes,
+            controls_volumes: _,
             stepping: _,
         } = fresh;
-        self.controls_volumes = controls_volumes;
-        (self.desc, self.origin) = (desc, origin);
+        self.controls_volumes = bodies.indices().any(|body| bodies[body].desc.volume_gain > 0.0);
+        self.desc = desc;
         (self.bodies, self.links, self.skeletons, self.springs) = (bodies, links, skeletons, springs);
-        self.stepping.restart(memories, resting, contacts);
-        Ok(())
     }
 
     /// Works out what follows from the descriptors.
-    fn derive(&mut self) -> Result<()> {
+    pub(super) fn derive(&mut self) -> Result<()> {
         for index in 0..self.skeletons.capacity() {
             let Some(skeleton) = self.skeletons.at_mut(index) else { continue };
             let link = &self.links[skeleton.link as usize];

@@ -390,6 +390,52 @@ static void queries()
     }
 }
 
+static void recordings()
+{
+    isocoat::world world;
+    isocoat::body ball = world.create_body();
+    ball.create_link(isocoat_link_desc_default()).create_skeleton(isocoat_skeleton_desc_default());
+    isocoat::recorder memory;
+    std::vector<std::uint8_t> file;
+    isocoat::recorder stream([&](isocoat::span<const std::uint8_t> bytes) {
+        file.insert(file.end(), bytes.begin(), bytes.end());
+        return true;
+    });
+    for (int frame = 0; frame < 3; ++frame) {
+        memory.capture(world, 0.5 * frame);
+        stream.capture(world, 0.5 * frame);
+        if (frame == 1) world.create_body();
+    }
+    stream.finish();
+    CHECK(memory.frame_count() == 3 && memory.byte_count() < memory.bytes().size() && memory.bytes() == file);
+    isocoat::playback playback(file);
+    CHECK(playback.frame_count() == 3 && playback.time(2) == 1.0 && playback.world().bodies().empty());
+    CHECK(playback.seek(2).bodies().size() == 2 && playback.seek(0).bodies().size() == 1);
+    isocoat::playback moved = std::move(playback);
+    CHECK(moved.world().cast_ray({0, 0, 5}, {0, 0, -1}, 10.0)->distance == world.cast_ray({0, 0, 5}, {0, 0, -1}, 10.0)->distance);
+    CHECK(moved.world().snapshot().size() > 0);
+    try {
+        moved.world().bodies()[0].destroy();
+        CHECK(false);
+    } catch (const isocoat::error &error) {
+        CHECK(error.status() == ISOCOAT_ERROR_UNSUPPORTED);
+    }
+    file[file.size() / 2] ^= 1;
+    try {
+        isocoat::playback damaged(file);
+        CHECK(false);
+    } catch (const isocoat::error &error) {
+        CHECK(error.status() == ISOCOAT_ERROR_RECORDING);
+    }
+    isocoat::recorder thrower([](isocoat::span<const std::uint8_t>) -> bool { throw 42; });
+    try {
+        thrower.capture(world, 0.0);
+        CHECK(false);
+    } catch (int thrown) {
+        CHECK(thrown == 42);
+    }
+}
+
 int main()
 {
     isocoat::check_abi();
@@ -400,6 +446,7 @@ int main()
     what_a_callback_throws_comes_out_of_the_step();
     motion();
     snapshots();
+    recordings();
     threads_help();
     substances();
     queries();
