@@ -48,10 +48,21 @@ impl Coat {
 
     /// The coat of some of the skeletons, by their positions.
     pub fn subset(&self, positions: &[u32]) -> Coat {
-        let mut graph = Graph::default();
-        self.graph.restrict(positions, &mut graph);
-        let skeletons = positions.iter().map(|position| self.skeletons[*position as usize]).collect();
-        Coat { skeletons, graph, ..*self }
+        let mut out = Coat::default();
+        self.subset_into(positions, &mut out);
+        out
+    }
+
+    /// [`Coat::subset`] in place of another coat, in its memory.
+    pub fn subset_into(&self, positions: &[u32], out: &mut Coat) {
+        (out.origin, out.isovalue) = (self.origin, self.isovalue);
+        out.skeletons.clear();
+        out.skeletons.extend(positions.iter().map(|position| self.skeletons[*position as usize]));
+        if self.graph.is_complete() {
+            out.graph.clear();
+        } else {
+            self.graph.restrict(positions, &mut out.graph);
+        }
     }
 
     /// How far the field is above the isovalue at a point of the frame: not negative inside the solid.

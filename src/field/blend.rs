@@ -63,7 +63,7 @@ pub fn together(graph: &Graph, fields: impl Iterator<Item = (usize, f64)>) -> f6
 #[inline]
 pub fn value_gradient(skeletons: &[Placed], graph: &Graph, p: &Vec3) -> (f64, Vec3) {
     if !graph.is_complete() {
-        return grouped_gradient(skeletons, graph, p);
+        return grouped_gradient(skeletons.iter().enumerate(), graph, p);
     }
     let mut sum = (0.0, Vec3::zeros());
     for skeleton in skeletons {
@@ -74,12 +74,20 @@ pub fn value_gradient(skeletons: &[Placed], graph: &Graph, p: &Vec3) -> (f64, Ve
     sum
 }
 
+/// Gradient of some skeletons together, given with their positions: the others' fields are zero at the point.
+pub fn gradient_of<'a>(graph: &Graph, some: impl Iterator<Item = (usize, &'a Placed)>, p: &Vec3) -> Vec3 {
+    if graph.is_complete() {
+        return some.map(|(_, skeleton)| skeleton.value_gradient(p).1).sum();
+    }
+    grouped_gradient(some, graph, p).1
+}
+
 #[inline(never)]
-fn grouped_gradient(skeletons: &[Placed], graph: &Graph, p: &Vec3) -> (f64, Vec3) {
+fn grouped_gradient<'a>(some: impl Iterator<Item = (usize, &'a Placed)>, graph: &Graph, p: &Vec3) -> (f64, Vec3) {
     SCRATCH.with_borrow_mut(|Scratch { active, gradients, work, .. }| {
         active.clear();
         gradients.clear();
-        for (index, skeleton) in skeletons.iter().enumerate() {
+        for (index, skeleton) in some {
             let (value, gradient) = skeleton.value_gradient(p);
             if value != 0.0 {
                 active.push((index, value));

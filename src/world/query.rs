@@ -1,7 +1,7 @@
 //! Questions between steps: fields, rays, overlaps, closest points, seeds.
 
+use super::rays::Ray;
 use super::{Body, BodyId, Deformation, LinkId, SkeletonId, World};
-use crate::coat::seeds::Ray;
 use crate::coat::{Coat, seeds, territory};
 use crate::error::{Error, Result, out_of_range, require, require_finite};
 use crate::math::{Pose, Vec3};
@@ -115,7 +115,7 @@ impl World {
     }
 
     /// Bodies that take part and have a bit of the mask in their category, in the order of their ids.
-    fn bodies_of(&self, mask: u64) -> impl Iterator<Item = usize> + '_ {
+    pub(super) fn bodies_of(&self, mask: u64) -> impl Iterator<Item = usize> + '_ {
         self.bodies.indices().filter(move |index| {
             let body = &self.bodies[*index];
             body.enabled && body.desc.category & mask != 0
@@ -123,7 +123,7 @@ impl World {
     }
 
     /// What a part of a coat belongs to; a particle to neither.
-    fn skeleton_and_link(&self, skeletons: &[usize], part: usize) -> (SkeletonId, LinkId) {
+    pub(super) fn skeleton_and_link(&self, skeletons: &[usize], part: usize) -> (SkeletonId, LinkId) {
         let Some(&index) = skeletons.get(part) else { return Default::default() };
         (self.skeletons.id_of(index), self.links.id_of(self.skeletons[index].link as usize))
     }
@@ -204,15 +204,7 @@ impl World {
         mask: u64,
         deformation: Deformation,
     ) -> Result<Option<RayHit>> {
-        require_finite("ray origin", origin)?;
-        require_finite("ray direction", direction)?;
-        // Scaled first, so that no square overflows or vanishes.
-        let largest = direction.amax();
-        require("length of the ray direction", largest, "> 0", |x| x > 0.0)?;
-        if max_distance.is_nan() || max_distance < 0.0 {
-            return Err(out_of_range("max_distance", max_distance, "at least 0 (infinity is fine)"));
-        }
-        let direction = (direction / largest).normalize();
+        let direction = Ray { origin: *origin, direction: *direction, max_distance }.unit_direction()?;
         let mut length = max_distance;
         let mut first = None;
         for body in self.bodies_of(mask) {
@@ -309,7 +301,7 @@ impl World {
         let count = if desc.seed_count == 0 { self.desc.seed_count } else { desc.seed_count };
         seeds::rays(&desc.shape, desc.thickness, count as usize, &mut followed.rays);
         let pose = posed.poses[index];
-        let rays: Vec<Ray> = followed.rays.iter().map(|ray| ray.transformed(&pose)).collect();
+        let rays: Vec<seeds::Ray> = followed.rays.iter().map(|ray| ray.transformed(&pose)).collect();
         territory::seeds(&posed.coat, index, &rays, &mut followed.seeds);
         Ok(followed)
     }
@@ -319,6 +311,6 @@ impl World {
 #[derive(Default)]
 pub(super) struct Followed {
     pub(super) origin: Vec3,
-    pub(super) rays: Vec<Ray>,
+    pub(super) rays: Vec<seeds::Ray>,
     pub(super) seeds: Vec<territory::Seed>,
 }

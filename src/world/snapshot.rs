@@ -293,6 +293,7 @@ impl World {
             links,
             skeletons,
             springs,
+            skins: _,
             log: _,
             pair_filter: _,
             tasks: _,
@@ -335,6 +336,7 @@ impl World {
             links: read_arena(&mut from)?,
             skeletons: read_arena(&mut from)?,
             springs: read_arena(&mut from)?,
+            skins: Arena::new(0),
             log: Alone::default(),
             pair_filter: Alone::default(),
             tasks: Alone::default(),
@@ -364,7 +366,10 @@ impl World {
             // Of the same origin are only those snapshots that this world takes from now on.
             fresh.origin = new_origin();
             std::mem::swap(&mut self.own_tag, &mut fresh.own_tag);
-            self.own_tag.number()
+            let tag = self.own_tag.number();
+            // No skin of the bodies that were here fits those that come.
+            self.skins = Arena::new(tag);
+            tag
         };
         fresh.bodies.set_world(tag);
         fresh.links.set_world(tag);
@@ -393,6 +398,7 @@ impl World {
             links,
             skeletons,
             springs,
+            skins: _,
             log: _,
             pair_filter: _,
             tasks: _,

@@ -2,7 +2,7 @@
 
 use super::{Cubes, Solid, Spans};
 use crate::field::{Graph, Placed, Shape, blend, lanes};
-use crate::math::Vec3;
+use crate::math::{Vec3, ball_round};
 use crate::surface::deformed::{Deformed, Obstacle};
 
 /// Rounding of a sum of fields, over the isovalue: bounds that are closer to it than that decide nothing.
@@ -144,12 +144,4 @@ impl Solid for Coated<'_> {
         }
         self.scratch.gradients = own;
     }
-}
-
-/// A ball that holds all points.
-fn ball_round(points: &[[f64; 3]]) -> (Vec3, f64) {
-    let each = points.iter().map(|p| Vec3::from(*p));
-    let empty = (Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY));
-    let (low, high) = each.fold(empty, |(low, high), p| (low.inf(&p), high.sup(&p)));
-    ((low + high) * 0.5, 0.5 * (high - low).norm())
 }
