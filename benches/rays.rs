@@ -56,19 +56,19 @@ fn run(bencher: Bencher, world: &World, desc: &RaysDesc) {
 }
 
 /// A blob of 100.
-#[divan::bench(args = ["point", "segment"])]
+#[divan::bench(args = ["point", "segment"], sample_count = 10)]
 fn blob_of_100(bencher: Bencher, shape: &str) {
     run(bencher, &blob(100, shape, 0.2), &RaysDesc::default());
 }
 
 /// Ten thousand small points.
-#[divan::bench]
+#[divan::bench(sample_count = 10)]
 fn blob_of_10000(bencher: Bencher) {
     run(bencher, &blob(10_000, "point", 0.04), &RaysDesc::default());
 }
 
 /// The blob of 100 points, pressed by a ball from the side of the camera.
-#[divan::bench]
+#[divan::bench(sample_count = 10)]
 fn pressed(bencher: Bencher) {
     let mut world = blob(100, "point", 0.2);
     let body = world.create_body(BodyDesc { rigid: true, ..BodyDesc::default() }).expect("a body");

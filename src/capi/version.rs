@@ -81,6 +81,9 @@ const LAYOUTS: &[Layout] = &[
     fixed::<super::piece::isocoat_change>("isocoat_change"),
     growable::<super::mesh::isocoat_mesh_desc>(),
     fixed::<super::mesh::isocoat_mesh_view>("isocoat_mesh_view"),
+    fixed::<super::buffer::isocoat_const_buffer>("isocoat_const_buffer"),
+    growable::<super::rays::isocoat_rays_desc>(),
+    growable::<super::rays::isocoat_ray_hits>(),
 ];
 
 /// What isocoat_check_abi calls: compares a host's version and struct sizes with the library's.

@@ -20,8 +20,9 @@ use crate::math::Vec3;
 const STRIDE: f64 = 1.0 / 1024.0;
 /// Rounding of a sum of fields, over the isovalue.
 const ROUNDING: f64 = 1e-14;
-/// A Newton's step over the shortest stride that needs none after it.
-const SETTLED: f64 = 1e-5;
+/// A Newton's step over the shortest stride that needs none after it: its square, over a radius of influence, is 1e-13
+/// of that.
+const SETTLED: f64 = 3e-4;
 
 /// Follows a ray to the first point where the coat's field reaches the isovalue.
 ///
@@ -399,7 +400,6 @@ fn close_root(start: f64, room: f64, mut at: (f64, f64), jet: impl Fn(f64) -> (f
         if !(at.1 > 0.0 && step.abs() <= last && s >= low && s <= high) {
             return None;
         }
-        // What is left is the square of this, over a length of which `room` is the thousandth part at most.
         if step.abs() <= SETTLED * room {
             return Some(s);
         }

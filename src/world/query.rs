@@ -204,7 +204,9 @@ impl World {
         mask: u64,
         deformation: Deformation,
     ) -> Result<Option<RayHit>> {
-        let direction = Ray { origin: *origin, direction: *direction, max_distance }.unit_direction()?;
+        let ray = Ray { origin: *origin, direction: *direction, max_distance };
+        ray.check()?;
+        let direction = ray.unit_direction();
         let mut length = max_distance;
         let mut first = None;
         for body in self.bodies_of(mask) {

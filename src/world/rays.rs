@@ -20,17 +20,25 @@ pub struct Ray {
 }
 
 impl Ray {
-    /// The direction with unit length, or what is wrong with the ray.
-    pub(super) fn unit_direction(&self) -> Result<Vec3> {
+    /// What is wrong with the ray, if anything is.
+    pub(super) fn check(&self) -> Result<()> {
         require_finite("ray origin", &self.origin)?;
         require_finite("ray direction", &self.direction)?;
-        // Scaled first, so that no square overflows or vanishes.
-        let largest = self.direction.amax();
-        require("length of the ray direction", largest, "> 0", |x| x > 0.0)?;
+        require("length of the ray direction", self.direction.amax(), "> 0", |x| x > 0.0)?;
         if self.max_distance.is_nan() || self.max_distance < 0.0 {
             return Err(out_of_range("max_distance", self.max_distance, "at least 0 (infinity is fine)"));
         }
-        Ok((self.direction / largest).normalize())
+        Ok(())
+    }
+
+    /// The direction with unit length, of a ray that makes sense.
+    pub(super) fn unit_direction(&self) -> Vec3 {
+        let square = self.direction.norm_squared();
+        if square > 1e-200 {
+            return self.direction / square.sqrt();
+        }
+        // Scaled first, so that no square vanishes.
+        (self.direction / self.direction.amax()).normalize()
     }
 }
 
@@ -83,7 +91,7 @@ impl World {
         mut tell: impl FnMut(usize, Option<RayHit>),
     ) -> std::result::Result<(), (usize, Error)> {
         for (index, ray) in rays.clone().enumerate() {
-            ray.unit_direction().map_err(|error| (index, error))?;
+            ray.check().map_err(|error| (index, error))?;
         }
         let mut aims: Vec<Aim> = self.bodies_of(desc.mask).map(|body| self.aim(body, desc.deformation)).collect();
         let mut tree = Tree::default();
@@ -94,7 +102,7 @@ impl World {
         }));
         let mut near: Vec<(f64, u32)> = Vec::new();
         for (index, ray) in rays.enumerate() {
-            let direction = ray.unit_direction().map_err(|error| (index, error))?;
+            let direction = ray.unit_direction();
             near.clear();
             tree.meet(&ray.origin, &direction, ray.max_distance, |aim, at| near.push((at, aim)));
             near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));

@@ -49,13 +49,7 @@ impl<'a> Coated<'a> {
     }
 
     /// The field of the undeformed coat.
-    fn field(
-        &mut self,
-        parts: &[u32],
-        points: &[[f64; 3]],
-        values: &mut [f64],
-        mut gradients: Option<&mut [[f64; 3]]>,
-    ) {
+    fn field(&mut self, parts: &[u32], points: &[[f64; 3]], values: &mut [f64], gradients: Option<&mut [[f64; 3]]>) {
         let coat = &self.deformed.coat;
         let Scratch { graph, placed, .. } = &mut *self.scratch;
         if coat.graph.is_complete() {
@@ -68,13 +62,7 @@ impl<'a> Coated<'a> {
         }
         placed.clear();
         placed.extend(parts.iter().map(|part| coat.skeletons[*part as usize]));
-        for (index, p) in points.iter().enumerate() {
-            let (value, gradient) = blend::value_gradient(placed, graph, &Vec3::from(*p));
-            values[index] = value;
-            if let Some(gradients) = &mut gradients {
-                gradients[index] = gradient.into();
-            }
-        }
+        blend::evaluate(placed, graph, points, Some(values), gradients);
     }
 }
 

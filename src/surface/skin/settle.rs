@@ -8,11 +8,11 @@ use crate::math::{Vec3, ball_round};
 use crate::surface::deformed::Deformed;
 use crate::surface::prepared::Prepared;
 
-/// How near to its level a vertex ends, over the smallest thickness.
-const NEAR: f64 = 1e-5;
-/// Longest step, over the smallest thickness.
+/// Longest last step, over the smallest thickness near a vertex: after Newton's step what is left is about its square.
+const LAST: f64 = 1e-3;
+/// Longest step, likewise.
 const STRIDE: f64 = 0.25;
-/// How far skeletons are looked for beyond the vertices, over the smallest thickness.
+/// How far skeletons are looked for beyond the vertices, over the smallest thickness of all.
 const MARGIN: f64 = 0.5;
 /// Most evaluations.
 const ROUNDS: usize = 40;
@@ -46,7 +46,7 @@ impl Vertex {
     }
 
     /// Goes on from where the coat's own field has this value and gradient; false when it has arrived.
-    fn step(&mut self, near: &Deformed, pressed: bool, value: f64, own: &Vec3, thinnest: f64) -> bool {
+    fn step(&mut self, near: &Deformed, pressed: bool, value: f64, own: &Vec3, thin: f64) -> bool {
         let Some(level) = self.level else { return false };
         if let Some((beyond, left)) = &mut self.border {
             let Some((inner, slope)) = &mut self.last else { return false };
@@ -75,7 +75,11 @@ impl Vertex {
         }
         self.gradient = gradient;
         let slope = gradient.norm();
-        if slope == 0.0 || excess.abs() <= NEAR * thinnest * slope {
+        if slope == 0.0 {
+            return false;
+        }
+        if excess.abs() <= LAST * thin * slope {
+            self.position -= gradient * (excess / (slope * slope));
             return false;
         }
         if let Some((inner, _)) = self.last
@@ -83,7 +87,7 @@ impl Vertex {
         {
             self.across = Some((inner, self.before));
         }
-        let length = (excess.abs() / slope).min(STRIDE * thinnest);
+        let length = (excess.abs() / slope).min(STRIDE * thin);
         let newton = gradient * (-excess.signum() * length / slope);
         let next = match self.across {
             None => self.position + newton,
@@ -132,11 +136,13 @@ impl Settler {
             values.resize(points.len(), 0.0);
             gradients.resize(points.len(), [0.0; 3]);
             near.coat.evaluate(points, Some(&mut *values), Some(&mut *gradients));
+            let thicknesses = near.coat.skeletons.iter().map(|skeleton| skeleton.profile.thickness);
+            let thin = thicknesses.fold(f64::INFINITY, f64::min);
             let pressed = near.obstacles.iter().any(|obstacle| !obstacle.coat.skeletons.is_empty());
             let mut fields = values.iter().zip(&*gradients);
             going.retain(|index| {
                 let Some((value, own)) = fields.next() else { return false };
-                vertices[*index as usize].step(near, pressed, *value, &Vec3::from(*own), thinnest)
+                vertices[*index as usize].step(near, pressed, *value, &Vec3::from(*own), thin)
             });
         }
     }
