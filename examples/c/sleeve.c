@@ -13,7 +13,8 @@
 
 enum { RINGS = 60, SIDES = 40, COUNT = RINGS * SIDES, TRIANGLES = 2 * (RINGS - 1) * SIDES + 2 * (SIDES - 2) };
 #define TURN 6.283185307179586
-static const double LENGTH = 0.35, THICKNESS = 0.1, PRESSED = 0.035;
+/* The bones end this far from the elbow, where their fields add up to what each has alone at the same radius. */
+static const double LENGTH = 0.35, THICKNESS = 0.1, GAP = 0.08, PRESSED = 0.035;
 
 typedef struct tube {
     double positions[3 * COUNT], normals[3 * COUNT];
@@ -51,7 +52,7 @@ static void make_tube(tube *it)
     }
 }
 
-/* Two capsules that meet in the elbow, at the origin. */
+/* Two bones in one coat; the elbow is the origin. */
 static int make_arm(isocoat_world *world, isocoat_body *body, isocoat_link links[2])
 {
     isocoat_body_desc body_desc = isocoat_body_desc_default();
@@ -65,6 +66,7 @@ static int make_arm(isocoat_world *world, isocoat_body *body, isocoat_link links
         link_desc.kind = ISOCOAT_LINK_HOST;
         CHECK(isocoat_link_create(world, *body, &link_desc, &links[k]));
         desc.shape = ISOCOAT_SHAPE_SEGMENT;
+        desc.points[0][0] = k == 0 ? -GAP : GAP;
         desc.points[1][0] = k == 0 ? -LENGTH : LENGTH;
         desc.thickness = THICKNESS;
         CHECK(isocoat_skeleton_create(world, links[k], &desc, &made));
