@@ -6,8 +6,10 @@ mod character;
 use character::Character;
 use divan::{Bencher, counter::ItemsCount};
 use isocoat::World;
+use isocoat::field::Shape;
+use isocoat::math::{Pose, Vec3};
 use isocoat::world::mesh::MeshDesc;
-use isocoat::world::{Deformation, SkinId, WorldDesc};
+use isocoat::world::{BodyDesc, Deformation, LinkDesc, SkeletonDesc, SkinId, WorldDesc};
 
 fn main() {
     divan::main();
@@ -40,6 +42,22 @@ fn frame(bencher: Bencher, amount: f64) {
         world
             .deform_skin(skin, Deformation::None, |_, position, normal| sum += position.x + normal.x)
             .expect("a frame");
+        sum
+    });
+}
+
+/// A frame with the feet in a floor.
+#[divan::bench(sample_count = 20)]
+fn pressed(bencher: Bencher) {
+    let (mut world, _, skin) = dressed();
+    let floor = world.create_body(BodyDesc { rigid: true, ..BodyDesc::default() }).expect("a body");
+    let desc = LinkDesc { pose: Pose::at(0.0, 0.0, 0.02 - 0.1), ..LinkDesc::default() };
+    let link = world.create_link(floor, desc).expect("a link");
+    let shape = Shape::Plane { point: Vec3::zeros(), normal: Vec3::z() };
+    world.create_skeleton(link, SkeletonDesc { shape, thickness: 0.1, ..SkeletonDesc::default() }).expect("a skeleton");
+    bencher.counter(ItemsCount::new(VERTICES)).bench_local(|| {
+        let mut sum = 0.0;
+        world.deform_skin(skin, Deformation::Bulges, |_, position, _| sum += position.x).expect("a frame");
         sum
     });
 }

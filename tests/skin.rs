@@ -212,6 +212,43 @@ fn no_vertex_goes_through_a_floor_that_the_body_is_pressed_into() {
 }
 
 #[test]
+fn a_mesh_over_the_coat_or_under_it_does_not_go_through_a_rigid_floor_either() {
+    for deformation in [Deformation::Contact, Deformation::Bulges] {
+        let mut world = world();
+        let (body, links) = limb(&mut world, BodyDesc { bulge_width: 0.5, bulge_height: 1.0, ..BodyDesc::default() });
+        let mesh = world.mesh(body, &MeshDesc::new(0.02)).unwrap();
+        let shift = |k: usize| [0.04, 0.02, -0.02][k % 3];
+        let points: Vec<[f64; 3]> = (0..mesh.positions.len())
+            .map(|k| (Vec3::from(mesh.positions[k]) + Vec3::from(mesh.normals[k]) * shift(k)).into())
+            .collect();
+        let skin = world.create_skin(body, &points, None).unwrap();
+        place(&mut world, links[1], turned(Vec3::zeros(), Vec3::z() * 0.8));
+        let lowest = deform(&world, skin, Deformation::None).0.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
+        let height = lowest + 0.8 * T;
+        floor(&mut world, height, true);
+        let (now, _) = deform(&world, skin, deformation);
+        let through = now.iter().map(|p| height - p.z).fold(f64::NEG_INFINITY, f64::max);
+        println!("{deformation:?}: {through:.1e} m through");
+        assert!(through < 1e-2 * T);
+    }
+}
+
+#[test]
+fn several_threads_deform_one_skin_and_get_the_same() {
+    let mut world = world();
+    let character = Character::new(&mut world);
+    let (_, skin) = dress(&mut world, character.body, 0.03);
+    character.bend(&mut world, 0.8);
+    let alone = deform(&world, skin, Deformation::None);
+    std::thread::scope(|scope| {
+        let threads = [0, 1, 2].map(|_| scope.spawn(|| deform(&world, skin, Deformation::None)));
+        for thread in threads {
+            assert!(thread.join().unwrap() == alone);
+        }
+    });
+}
+
+#[test]
 fn the_skins_of_two_bodies_that_press_on_each_other_do_not_cross() {
     let mut world = world();
     let (first, _) = add(&mut world, BodyDesc::default(), &[vec![Shape::Point(Vec3::zeros())]]);
