@@ -125,6 +125,14 @@ pub fn rotate_tensor(q: &Quat, local: &Mat3) -> Mat3 {
     r.matrix() * local * r.matrix().transpose()
 }
 
+/// Middle and radius of a ball that holds all points.
+pub fn ball_round(points: &[[f64; 3]]) -> (Vec3, f64) {
+    let each = points.iter().map(|p| Vec3::from(*p));
+    let empty = (Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY));
+    let (low, high) = each.fold(empty, |(low, high), p| (low.inf(&p), high.sup(&p)));
+    ((low + high) * 0.5, 0.5 * (high - low).norm())
+}
+
 /// True when every component is a finite number.
 pub fn is_finite(v: &Vec3) -> bool {
     v.iter().all(|x| x.is_finite())

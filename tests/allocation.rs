@@ -5,6 +5,7 @@ mod common;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
+use common::character::Character;
 use common::pool::Pool;
 use common::{Coat, ball_inertia, box_inertia};
 use isocoat::base::Kind;
@@ -12,8 +13,9 @@ use isocoat::field::Shape;
 use isocoat::math::{Pose, Vec3};
 use isocoat::surface::mesh::Mesh;
 use isocoat::world::mesh::{MeshDesc, MeshWorkspace};
+use isocoat::world::rays::{Ray, RaysDesc};
 use isocoat::world::{
-    BodyDesc, LinkDesc, LinkId, LinkState, Response, Scheme, SkeletonDesc, SpringDesc, World, WorldDesc,
+    BodyDesc, Deformation, LinkDesc, LinkId, LinkState, Response, Scheme, SkeletonDesc, SpringDesc, World, WorldDesc,
 };
 
 thread_local! {
@@ -238,4 +240,41 @@ fn a_mesh_made_again_allocates_nothing() {
     make(&world, 0.01);
     make(&world, 0.02);
     assert_eq!(ALLOCATIONS.get() - before, 0);
+}
+
+#[test]
+fn a_skin_deformed_again_allocates_nothing_and_no_ray_does() {
+    let mut world = World::new(WorldDesc::default()).unwrap();
+    let character = Character::new(&mut world);
+    let mesh = world.mesh(character.body, &MeshDesc::new(0.05)).unwrap();
+    let skin = world.create_skin(character.body, &mesh.positions, Some(&mesh.normals)).unwrap();
+    let frame = |world: &World| world.deform_skin(skin, Deformation::None, |_, _, _| ()).unwrap();
+    for amount in [1.0, 0.5, 0.0] {
+        character.bend(&mut world, amount);
+        frame(&world);
+    }
+    for amount in [0.0, 0.5, 1.0] {
+        character.bend(&mut world, amount);
+        let before = ALLOCATIONS.get();
+        TRACED.set(true);
+        frame(&world);
+        TRACED.set(false);
+        assert_eq!(ALLOCATIONS.get() - before, 0);
+    }
+
+    let cast = |count: usize| {
+        let rays = (0..count).map(|k| Ray {
+            origin: Vec3::new(0.0, 3.0, 0.1 + (k % 50) as f64 * 0.03),
+            direction: Vec3::new(((k / 50 % 10) as f64 - 5.0) * 0.02, -1.0, 0.0),
+            max_distance: f64::INFINITY,
+        });
+        let before = ALLOCATIONS.get();
+        let mut hits = 0;
+        world.cast_rays(rays, &RaysDesc::default(), |_, hit| hits += usize::from(hit.is_some())).unwrap();
+        assert!(hits * 4 > count);
+        ALLOCATIONS.get() - before
+    };
+    cast(500);
+    let (few, many) = (cast(500), cast(5000));
+    assert!(many <= few + 8, "{few} allocations for 500 rays, {many} for 5000");
 }

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use isocoat::capi::{
-    body, buffer, draw, handle, link, math, mesh, motion, piece, query, recording, report, skeleton, spring, substance,
-    world,
+    body, buffer, draw, handle, link, math, mesh, motion, piece, query, rays, recording, report, skeleton, spring,
+    substance, world,
 };
 
 const WARNINGS: &[&str] =
@@ -189,6 +189,12 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
         piece::isocoat_change { kind, reserved, body, particle_count, first_particle }
         query::isocoat_ray_hit { body, link, skeleton, distance, position, normal }
         query::isocoat_surface_point { position, normal, distance, link, skeleton }
+        handle::isocoat_skin { index, generation, world }
+        buffer::isocoat_const_buffer { data, stride, format }
+        rays::isocoat_rays_desc { struct_size, deformation, goal, reserved, mask, max_distance }
+        rays::isocoat_ray_hits {
+            struct_size, reserved, distances, positions, normals, bodies, links, skeletons,
+        }
         mesh::isocoat_mesh_desc { struct_size, deformation, cell_size }
         mesh::isocoat_mesh_view { positions, normals, triangles, valid, vertex_count, triangle_count }
         recording::isocoat_recorder_desc { struct_size, key_interval, context, write }

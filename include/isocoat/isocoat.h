@@ -190,6 +190,19 @@ typedef struct isocoat_spring {
     uint16_t world;
 } isocoat_spring;
 
+/**
+ * Handle of a skin: a mesh of the host that a body's coat carries. The rules of isocoat_body hold; but a restore brings
+ * no skin back.
+ */
+typedef struct isocoat_skin {
+    /** Slot of the skin in its world. */
+    uint32_t index;
+    /** How often the slot was used; 0 only in the null handle. */
+    uint16_t generation;
+    /** Tag of the world; 0 only in the null handle. */
+    uint16_t world;
+} isocoat_skin;
+
 /* ---- Poses, wrenches, inertia ------------------------------------------------------------------------------------ */
 
 /** Position and orientation of a frame in the world. */
@@ -1584,6 +1597,16 @@ typedef struct isocoat_buffer {
     isocoat_format format;
 } isocoat_buffer;
 
+/** Where a bulk call reads: elements of 3 numbers, or one, in the host's own memory. */
+typedef struct isocoat_const_buffer {
+    /** First number of the first element; NULL when there are none. */
+    const void *data;
+    /** Bytes from one element to the next: at least the size of an element, or 0 for elements without gaps. */
+    size_t stride;
+    /** Number type. */
+    isocoat_format format;
+} isocoat_const_buffer;
+
 /**
  * Sets the states of many links, as isocoat_link_set_state does: all of them, or none if one is refused.
  *
@@ -2406,6 +2429,98 @@ isocoat_status isocoat_skeleton_get_seeds(const isocoat_world *world,
                                           size_t capacity,
                                           size_t *count);
 
+/** Which hit of a ray is wanted: an ISOCOAT_RAY_ value. */
+typedef uint32_t isocoat_ray_goal;
+
+/** The first along the ray. */
+#define ISOCOAT_RAY_CLOSEST 0u
+/** That of any body, which is cheaper where many are in the way: enough to see whether something is. */
+#define ISOCOAT_RAY_ANY 1u
+
+/** What many rays have in common. Begin with isocoat_rays_desc_default(). */
+typedef struct isocoat_rays_desc {
+    /** Size of this struct in bytes, as the host knows it. */
+    uint32_t struct_size;
+    /** Which shapes they meet, an ISOCOAT_DEFORMATION_ value. Default ISOCOAT_DEFORMATION_NONE. */
+    isocoat_deformation deformation;
+    /** Which hits are wanted, an ISOCOAT_RAY_ value. Default ISOCOAT_RAY_CLOSEST. */
+    isocoat_ray_goal goal;
+    /** Must be 0. */
+    uint32_t reserved;
+    /** Bodies whose category has a bit of it are looked at. Default all. */
+    uint64_t mask;
+    /** Length of all rays in m, at least 0; may be infinite. Default infinite. */
+    double max_distance;
+} isocoat_rays_desc;
+
+/**
+ * Where the hits of many rays go: one element a ray. Of a ray that meets nothing, the distance is infinite, position
+ * and normal are 0, and the handles are null. Begin with isocoat_ray_hits_default().
+ */
+typedef struct isocoat_ray_hits {
+    /** Size of this struct in bytes, as the host knows it. */
+    uint32_t struct_size;
+    /** Must be 0. */
+    uint32_t reserved;
+    /** Receives a number a ray: its length up to the hit, in m. Default: skipped, as its data is NULL. */
+    isocoat_buffer distances;
+    /** Receives 3 numbers a ray, in m. Default: skipped, as its data is NULL. */
+    isocoat_buffer positions;
+    /** Receives 3 numbers a ray: the outward unit normal of the coat. Default: skipped, as its data is NULL. */
+    isocoat_buffer normals;
+    /** Receives the body of each hit. Default NULL: not wanted. */
+    isocoat_body *bodies;
+    /** Receives the link that carries the skeleton; null on a substance. Default NULL: not wanted. */
+    isocoat_link *links;
+    /** Receives the skeleton in whose territory the hit lies; null on a substance. Default NULL: not wanted. */
+    isocoat_skeleton *skeletons;
+} isocoat_ray_hits;
+
+/**
+ * Fills a descriptor with its defaults; isocoat_rays_desc_default() calls it.
+ *
+ * - desc: receives at most size bytes, its struct_size among them; not NULL.
+ * - size: sizeof(isocoat_rays_desc) as the host was compiled.
+ *
+ * Errors: INVALID_ARGUMENT. Threads: any.
+ */
+isocoat_status isocoat_rays_desc_init(isocoat_rays_desc *desc, size_t size);
+
+/**
+ * Fills a struct with its defaults; isocoat_ray_hits_default() calls it.
+ *
+ * - hits: receives at most size bytes, its struct_size among them; not NULL.
+ * - size: sizeof(isocoat_ray_hits) as the host was compiled.
+ *
+ * Errors: INVALID_ARGUMENT. Threads: any.
+ */
+isocoat_status isocoat_ray_hits_init(isocoat_ray_hits *hits, size_t size);
+
+/**
+ * What each of many rays meets, as isocoat_world_cast_ray_deformed() finds it. The coats are made ready once for all
+ * rays of a call, and each ray then looks only at the skeletons near it: a picture of 512 x 512 rays in one call is
+ * many times faster than in single ones. Memory is asked for once a call, none for each ray.
+ *
+ * - world: not NULL.
+ * - desc: what the rays have in common; not NULL.
+ * - origins: 3 numbers a ray, in m, finite; its data not NULL unless count is 0.
+ * - directions: 3 numbers a ray, of any length but 0, finite; its data not NULL unless count is 0.
+ * - max_distances: a number a ray, in m, at least 0, may be infinite; if its data is NULL, the desc's holds for all.
+ * - count: number of rays.
+ * - hits: where the results go; not NULL. They must not overlap what is read.
+ *
+ * Errors: INVALID_ARGUMENT, OUT_OF_RANGE, with the number of the ray; nothing is written then. Threads: reads the
+ * world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_world_cast_rays(const isocoat_world *world,
+                                       const isocoat_rays_desc *desc,
+                                       isocoat_const_buffer origins,
+                                       isocoat_const_buffer directions,
+                                       isocoat_const_buffer max_distances,
+                                       size_t count,
+                                       const isocoat_ray_hits *hits);
+
 /* ---- Meshes ------------------------------------------------------------------------------------------------------ */
 
 /**
@@ -2551,6 +2666,118 @@ isocoat_status isocoat_mesh_copy(const isocoat_mesh *mesh,
                                  size_t vertex_capacity,
                                  uint32_t *triangles,
                                  size_t triangle_capacity);
+
+/* ---- Skins ------------------------------------------------------------------------------------------------------- */
+
+/**
+ * Binds a mesh of the host to a body, at the present poses and undeformed; only its vertices matter. Each remembers the
+ * field of the body there, and the links whose skeletons make it; where no field reaches, it will follow the link of
+ * the nearest surface. The skin lives until it is destroyed, or the world; a snapshot leaves it out: it outlives the
+ * restoring of one of this world, and is gone after one of another world.
+ *
+ * - world: not NULL.
+ * - body: the body; it needs enabled skeletons, and may be disabled. Not a substance.
+ * - vertices: 3 numbers a vertex, in m, finite; its data not NULL unless count is 0.
+ * - normals: 3 numbers a vertex, the mesh's own normals, of any length but 0: they will turn as the coat does. If its
+ *   data is NULL, the skin has the coat's normals.
+ * - count: number of vertices.
+ * - skin: receives the handle; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE, UNSUPPORTED, CAPACITY. Threads: changes the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_skin_create(isocoat_world *world,
+                                   isocoat_body body,
+                                   isocoat_const_buffer vertices,
+                                   isocoat_const_buffer normals,
+                                   size_t count,
+                                   isocoat_skin *skin);
+
+/**
+ * Destroys a skin.
+ *
+ * - world: not NULL.
+ * - skin: the skin.
+ *
+ * Errors: INVALID_HANDLE. Threads: changes the world.
+ */
+ISOCOAT_MUST_USE isocoat_status isocoat_skin_destroy(isocoat_world *world, isocoat_skin skin);
+
+/**
+ * The body that a skin was bound to; it may have been destroyed since.
+ *
+ * - world: not NULL.
+ * - skin: the skin.
+ * - body: receives the handle; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_skin_get_body(const isocoat_world *world,
+                                     isocoat_skin skin,
+                                     isocoat_body *body);
+
+/**
+ * Number of vertices of a skin.
+ *
+ * - world: not NULL.
+ * - skin: the skin.
+ * - count: receives the number; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT. Threads: reads the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_skin_get_vertex_count(const isocoat_world *world,
+                                             isocoat_skin skin,
+                                             size_t *count);
+
+/**
+ * The links that a vertex of a skin follows, the heaviest first: the weight of a link is its skeletons' share of the
+ * field where the vertex was bound. For hosts that let the GPU move what is far from the eye.
+ *
+ * - world: not NULL.
+ * - skin: the skin.
+ * - vertex: number of the vertex.
+ * - links: receives the handles; NULL if not wanted.
+ * - weights: receives the weights, which add up to 1; NULL if not wanted.
+ * - capacity: links that fit into each of the two. With both NULL only the count is asked.
+ * - count: receives the number of links, also when they do not fit; not NULL.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE, BUFFER_TOO_SMALL. Threads: reads the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_skin_get_weights(const isocoat_world *world,
+                                        isocoat_skin skin,
+                                        size_t vertex,
+                                        isocoat_link *links,
+                                        double *weights,
+                                        size_t capacity,
+                                        size_t *count);
+
+/**
+ * Where the vertices of a skin are now: each goes with its links, and from there along the gradient to where the field
+ * of the body has the value that it had at the binding. So the skin dents where the coat is pressed, bulges round it,
+ * swells with it and does not pinch at joints. When the whole body has moved rigidly, so has the mesh. Depends on the
+ * present poses alone, not on earlier calls. Asks for no memory once it was called, for an undeformed shape.
+ *
+ * - world: not NULL.
+ * - skin: the skin. The body must have the enabled skeletons that it was bound to; what they are like may change.
+ * - deformation: which shape, an ISOCOAT_DEFORMATION_ value.
+ * - positions: receives 3 numbers a vertex, in m; skipped if its data is NULL.
+ * - normals: receives 3 numbers a vertex, unit vectors; skipped if its data is NULL.
+ * - vertex_capacity: vertices that fit into each of the two.
+ *
+ * Errors: INVALID_HANDLE (also when the body was destroyed), INVALID_ARGUMENT, UNSUPPORTED when skeletons of the body
+ * have gone or come, BUFFER_TOO_SMALL; nothing is written then. Threads: reads the world; calls for one skin wait for
+ * each other.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_skin_deform(const isocoat_world *world,
+                                   isocoat_skin skin,
+                                   isocoat_deformation deformation,
+                                   isocoat_buffer positions,
+                                   isocoat_buffer normals,
+                                   size_t vertex_capacity);
 
 /* ---- Volumes ----------------------------------------------------------------------------------------------------- */
 
@@ -3177,6 +3404,20 @@ static inline isocoat_recorder_desc isocoat_recorder_desc_default(void)
     return desc;
 }
 
+static inline isocoat_rays_desc isocoat_rays_desc_default(void)
+{
+    isocoat_rays_desc desc;
+    isocoat_rays_desc_init(&desc, sizeof desc);
+    return desc;
+}
+
+static inline isocoat_ray_hits isocoat_ray_hits_default(void)
+{
+    isocoat_ray_hits hits;
+    isocoat_ray_hits_init(&hits, sizeof hits);
+    return hits;
+}
+
 static inline isocoat_debug_draw isocoat_debug_draw_default(void)
 {
     isocoat_debug_draw draw;
@@ -3215,6 +3456,9 @@ ISOCOAT_MUST_USE static inline isocoat_status isocoat_check_abi(void)
         (uint32_t)sizeof(isocoat_mesh_desc),
         (uint32_t)sizeof(isocoat_mesh_view),
         (uint32_t)sizeof(isocoat_recorder_desc),
+        (uint32_t)sizeof(isocoat_const_buffer),
+        (uint32_t)sizeof(isocoat_rays_desc),
+        (uint32_t)sizeof(isocoat_ray_hits),
     };
     return isocoat_check_abi_of(ISOCOAT_VERSION, sizes, sizeof sizes / sizeof sizes[0]);
 }

@@ -10,7 +10,7 @@
  *     world.step(1.0 / 60.0);
  *     for (const isocoat::contact &contact : world.contacts()) { ... }
  *
- * A world owns; body, link, skeleton and spring are values that name something in it, as the C handles do: copying one copies
+ * A world owns; body, link, skeleton, spring and skin are values that name something in it, as the C handles do: copying one copies
  * no body, and dropping one destroys nothing. A call that fails throws isocoat::error and has changed nothing.
  */
 #ifndef ISOCOAT_HPP
@@ -101,6 +101,16 @@ private:
 /* Where a bulk call writes; stride is in bytes, 0 for elements without gaps. A default isocoat_buffer is skipped. */
 inline isocoat_buffer buffer(double *data, std::size_t stride = 0) { return {data, stride, ISOCOAT_FORMAT_F64}; }
 inline isocoat_buffer buffer(float *data, std::size_t stride = 0) { return {data, stride, ISOCOAT_FORMAT_F32}; }
+
+/* Where a bulk call reads, likewise. */
+inline isocoat_const_buffer source(const double *data, std::size_t stride = 0)
+{
+    return {data, stride, ISOCOAT_FORMAT_F64};
+}
+inline isocoat_const_buffer source(const float *data, std::size_t stride = 0)
+{
+    return {data, stride, ISOCOAT_FORMAT_F32};
+}
 
 namespace detail {
 
@@ -373,6 +383,44 @@ public:
     spring_state state() const { return detail::read(spring_state{}, isocoat_spring_get_state, world_, raw_); }
 };
 
+/* A mesh of the host that a body's coat carries; made by body::create_skin. */
+class skin : public detail::noun<isocoat_skin> {
+public:
+    using noun::noun;
+
+    void destroy() { check(isocoat_skin_destroy(world_, raw_)); }
+    /* The body that it was bound to. */
+    body parent() const;
+    std::size_t vertex_count() const
+    {
+        return detail::read(std::size_t{0}, isocoat_skin_get_vertex_count, world_, raw_);
+    }
+    /* The links that a vertex follows with their weights, the heaviest first. */
+    std::vector<std::pair<link, double>> weights(std::size_t vertex) const
+    {
+        std::size_t count = 0;
+        check(isocoat_skin_get_weights(world_, raw_, vertex, nullptr, nullptr, 0, &count));
+        std::vector<isocoat_link> links(count);
+        std::vector<double> weights(count);
+        check(isocoat_skin_get_weights(world_, raw_, vertex, links.data(), weights.data(), count, &count));
+        std::vector<std::pair<link, double>> pairs;
+        for (std::size_t k = 0; k < count; ++k) pairs.emplace_back(link(world_, links[k]), weights[k]);
+        return pairs;
+    }
+    /* Where the vertices are now, into the host's own, of which there are vertex_count. */
+    void deform(isocoat_buffer positions, isocoat_buffer normals, std::size_t vertex_count,
+                isocoat_deformation deformation = ISOCOAT_DEFORMATION_NONE) const
+    {
+        check(isocoat_skin_deform(world_, raw_, deformation, positions, normals, vertex_count));
+    }
+    std::vector<vec3> positions(isocoat_deformation deformation = ISOCOAT_DEFORMATION_NONE) const
+    {
+        std::vector<vec3> list(vertex_count());
+        if (!list.empty()) deform(buffer(list.front().data()), {}, list.size(), deformation);
+        return list;
+    }
+};
+
 class substance;
 
 /* One deformable or rigid object: a base of links, or of particles, and a coat. */
@@ -459,6 +507,18 @@ public:
         desc.cell_size = cell_size;
         desc.deformation = deformation;
         check(isocoat_body_make_mesh(world_, raw_, &desc, out.get()));
+    }
+    /* Binds a mesh of the host to it, at the present poses; without normals it has the coat's. */
+    skin create_skin(isocoat_const_buffer vertices, isocoat_const_buffer normals, std::size_t count)
+    {
+        return {world_, detail::read(isocoat_skin{}, isocoat_skin_create, world_, raw_, vertices, normals, count)};
+    }
+    skin create_skin(span<const vec3> vertices, span<const vec3> normals = {})
+    {
+        if (!normals.empty() && normals.size() != vertices.size())
+            throw error(ISOCOAT_ERROR_INVALID_ARGUMENT, "normals must be as many as vertices, or none");
+        return create_skin(source(vertices.empty() ? nullptr : vertices.data()->data()),
+                           source(normals.empty() ? nullptr : normals.data()->data()), vertices.size());
     }
 };
 
@@ -586,6 +646,11 @@ inline substance body::make_substance(const isocoat_substance_desc &desc)
 inline link skeleton::parent() const
 {
     return {world_, detail::read(isocoat_link{}, isocoat_skeleton_get_link, world_, raw_)};
+}
+
+inline body skin::parent() const
+{
+    return {world_, detail::read(isocoat_body{}, isocoat_skin_get_body, world_, raw_)};
 }
 
 inline body link::parent() const
@@ -767,6 +832,38 @@ public:
         check(isocoat_world_cast_ray_deformed(get(), origin.data(), direction.data(), max_distance, mask, deformation,
                                               &hit, &found));
         return found ? std::optional<ray_hit>(hit) : std::nullopt;
+    }
+    /* What many rays meet; the coats are made ready once for all of them. */
+    void cast_rays(const isocoat_rays_desc &desc, isocoat_const_buffer origins, isocoat_const_buffer directions,
+                   std::size_t count, const isocoat_ray_hits &hits, isocoat_const_buffer max_distances = {}) const
+    {
+        check(isocoat_world_cast_rays(get(), &desc, origins, directions, max_distances, count, &hits));
+    }
+    /* The same in a list; a ray that meets nothing has an infinite distance. */
+    std::vector<ray_hit> cast_rays(span<const vec3> origins, span<const vec3> directions,
+                                   const isocoat_rays_desc &desc = isocoat_rays_desc_default()) const
+    {
+        if (directions.size() != origins.size())
+            throw error(ISOCOAT_ERROR_INVALID_ARGUMENT, "directions must be as many as origins");
+        std::vector<ray_hit> list(origins.size());
+        if (list.empty()) return list;
+        std::vector<isocoat_body> bodies(list.size());
+        std::vector<isocoat_link> links(list.size());
+        std::vector<isocoat_skeleton> skeletons(list.size());
+        isocoat_ray_hits hits = isocoat_ray_hits_default();
+        hits.distances = buffer(&list.front().distance, sizeof(ray_hit));
+        hits.positions = buffer(list.front().position, sizeof(ray_hit));
+        hits.normals = buffer(list.front().normal, sizeof(ray_hit));
+        hits.bodies = bodies.data();
+        hits.links = links.data();
+        hits.skeletons = skeletons.data();
+        cast_rays(desc, source(origins.data()->data()), source(directions.data()->data()), list.size(), hits);
+        for (std::size_t k = 0; k < list.size(); ++k) {
+            list[k].body = bodies[k];
+            list[k].link = links[k];
+            list[k].skeleton = skeletons[k];
+        }
+        return list;
     }
     std::vector<body> overlap_sphere(const vec3 &center, double radius, std::uint64_t mask = UINT64_MAX) const
     {

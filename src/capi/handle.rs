@@ -1,6 +1,6 @@
 //! Handles: ids by value, one type a noun.
 
-use crate::world::{BodyId, LinkId, SkeletonId, SpringId};
+use crate::world::{BodyId, LinkId, SkeletonId, SkinId, SpringId};
 
 /// Handle of a body: one deformable or rigid object. All zero is null. A handle whose body was destroyed, or of
 /// another world, gives ISOCOAT_ERROR_INVALID_HANDLE; it never means another body. Only a restore makes it valid again,
@@ -52,6 +52,19 @@ pub struct isocoat_spring {
     pub world: u16,
 }
 
+/// Handle of a skin: a mesh of the host that a body's coat carries. The rules of isocoat_body hold; but a restore brings
+/// no skin back.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(C)]
+pub struct isocoat_skin {
+    /// Slot of the skin in its world.
+    pub index: u32,
+    /// How often the slot was used; 0 only in the null handle.
+    pub generation: u16,
+    /// Tag of the world; 0 only in the null handle.
+    pub world: u16,
+}
+
 macro_rules! converts {
     ($handle:ty, $id:ty) => {
         impl From<$handle> for $id {
@@ -72,3 +85,4 @@ converts!(isocoat_body, BodyId);
 converts!(isocoat_link, LinkId);
 converts!(isocoat_skeleton, SkeletonId);
 converts!(isocoat_spring, SpringId);
+converts!(isocoat_skin, SkinId);

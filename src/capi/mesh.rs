@@ -296,7 +296,7 @@ pub unsafe extern "C" fn isocoat_mesh_copy(
     })
 }
 
-fn fits(name: &str, capacity: usize, needed: usize) -> Checked<()> {
+pub(super) fn fits(name: &str, capacity: usize, needed: usize) -> Checked<()> {
     if needed <= capacity {
         return Ok(());
     }

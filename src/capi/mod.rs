@@ -3,7 +3,8 @@
 //! Mechanism and nouns are apart. Mechanism: [`status`] (codes, messages), [`version`], [`guard`] (panics, locks),
 //! [`mod@pointer`] and [`descriptor`] (memory of the host), [`handle`], [`buffer`]. Nouns: [`world`], [`body`],
 //! [`link`], [`skeleton`], [`blend`], [`spring`], [`substance`], [`particle`], [`piece`], [`math`], and what is done
-//! with them: [`motion`], [`bulk`], [`report`], [`snapshot`], [`recording`], [`query`], [`mesh`], [`draw`], [`tasks`], [`volume`].
+//! with them: [`motion`], [`bulk`], [`report`], [`snapshot`], [`recording`], [`query`], [`rays`], [`mesh`], [`skin`],
+//! [`draw`], [`tasks`], [`volume`].
 //!
 //! Nothing here computes: every function checks the host's pointers, translates, calls the public Rust API, and
 //! translates back. The comments are the manual that goes into the header.
@@ -27,9 +28,11 @@ pub mod particle;
 pub mod piece;
 pub mod pointer;
 pub mod query;
+pub mod rays;
 pub mod recording;
 pub mod report;
 pub mod skeleton;
+pub mod skin;
 pub mod snapshot;
 pub mod spring;
 pub mod status;

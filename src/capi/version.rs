@@ -82,6 +82,9 @@ const LAYOUTS: &[Layout] = &[
     growable::<super::mesh::isocoat_mesh_desc>(),
     fixed::<super::mesh::isocoat_mesh_view>("isocoat_mesh_view"),
     growable::<super::recording::isocoat_recorder_desc>(),
+    fixed::<super::buffer::isocoat_const_buffer>("isocoat_const_buffer"),
+    growable::<super::rays::isocoat_rays_desc>(),
+    growable::<super::rays::isocoat_ray_hits>(),
 ];
 
 /// What isocoat_check_abi calls: compares a host's version and struct sizes with the library's.

@@ -10,7 +10,7 @@ pub mod seeds;
 pub mod territory;
 pub mod volume;
 
-use crate::field::{Graph, Placed, Profile, Shape, blend, lanes};
+use crate::field::{Graph, Placed, Profile, Shape, blend};
 use crate::math::{Pose, Vec3};
 
 /// The skeletons of one body, how they blend, and the isovalue of the surface: the solid is where the field is at least
@@ -48,10 +48,21 @@ impl Coat {
 
     /// The coat of some of the skeletons, by their positions.
     pub fn subset(&self, positions: &[u32]) -> Coat {
-        let mut graph = Graph::default();
-        self.graph.restrict(positions, &mut graph);
-        let skeletons = positions.iter().map(|position| self.skeletons[*position as usize]).collect();
-        Coat { skeletons, graph, ..*self }
+        let mut out = Coat::default();
+        self.subset_into(positions, &mut out);
+        out
+    }
+
+    /// [`Coat::subset`] in place of another coat, in its memory.
+    pub fn subset_into(&self, positions: &[u32], out: &mut Coat) {
+        (out.origin, out.isovalue) = (self.origin, self.isovalue);
+        out.skeletons.clear();
+        out.skeletons.extend(positions.iter().map(|position| self.skeletons[*position as usize]));
+        if self.graph.is_complete() {
+            out.graph.clear();
+        } else {
+            self.graph.restrict(positions, &mut out.graph);
+        }
     }
 
     /// How far the field is above the isovalue at a point of the frame: not negative inside the solid.
@@ -65,29 +76,13 @@ impl Coat {
         (value - self.isovalue, gradient)
     }
 
-    /// Field values and gradients at many points of the frame; see [`lanes::evaluate`].
+    /// Field values and gradients at many points of the frame; see [`blend::evaluate`].
     ///
     /// # Panics
     ///
     /// When `values` or `gradients` is not as long as `points`.
-    pub fn evaluate(
-        &self,
-        points: &[[f64; 3]],
-        mut values: Option<&mut [f64]>,
-        mut gradients: Option<&mut [[f64; 3]]>,
-    ) {
-        if self.graph.is_complete() {
-            return lanes::evaluate(&self.skeletons, points, values, gradients);
-        }
-        for (index, p) in points.iter().enumerate() {
-            let (value, gradient) = blend::value_gradient(&self.skeletons, &self.graph, &Vec3::from(*p));
-            if let Some(values) = &mut values {
-                values[index] = value;
-            }
-            if let Some(gradients) = &mut gradients {
-                gradients[index] = gradient.into();
-            }
-        }
+    pub fn evaluate(&self, points: &[[f64; 3]], values: Option<&mut [f64]>, gradients: Option<&mut [[f64; 3]]>) {
+        blend::evaluate(&self.skeletons, &self.graph, points, values, gradients);
     }
 
     /// Outward unit normal of the level surface through a point of the frame; `fallback` where the field is flat.

@@ -6,6 +6,7 @@
 use std::cell::RefCell;
 
 use super::graph::{Active, Graph, Order, Workspace};
+use super::lanes;
 use super::skeleton::Placed;
 use crate::math::{Mat3, Vec3};
 
@@ -16,6 +17,8 @@ struct Scratch {
     gradients: Vec<Vec3>,
     hessians: Vec<Mat3>,
     work: Workspace,
+    /// At each point of a chunk, the skeletons that have a field there, and their gradients.
+    lists: Vec<(Vec<Active>, Vec<[f64; 3]>)>,
 }
 
 thread_local! {
@@ -63,7 +66,7 @@ pub fn together(graph: &Graph, fields: impl Iterator<Item = (usize, f64)>) -> f6
 #[inline]
 pub fn value_gradient(skeletons: &[Placed], graph: &Graph, p: &Vec3) -> (f64, Vec3) {
     if !graph.is_complete() {
-        return grouped_gradient(skeletons, graph, p);
+        return grouped_gradient(skeletons.iter().enumerate(), graph, p);
     }
     let mut sum = (0.0, Vec3::zeros());
     for skeleton in skeletons {
@@ -74,12 +77,20 @@ pub fn value_gradient(skeletons: &[Placed], graph: &Graph, p: &Vec3) -> (f64, Ve
     sum
 }
 
+/// Gradient of some skeletons together, given with their positions: the others' fields are zero at the point.
+pub fn gradient_of<'a>(graph: &Graph, some: impl Iterator<Item = (usize, &'a Placed)>, p: &Vec3) -> Vec3 {
+    if graph.is_complete() {
+        return some.map(|(_, skeleton)| skeleton.value_gradient(p).1).sum();
+    }
+    grouped_gradient(some, graph, p).1
+}
+
 #[inline(never)]
-fn grouped_gradient(skeletons: &[Placed], graph: &Graph, p: &Vec3) -> (f64, Vec3) {
+fn grouped_gradient<'a>(some: impl Iterator<Item = (usize, &'a Placed)>, graph: &Graph, p: &Vec3) -> (f64, Vec3) {
     SCRATCH.with_borrow_mut(|Scratch { active, gradients, work, .. }| {
         active.clear();
         gradients.clear();
-        for (index, skeleton) in skeletons.iter().enumerate() {
+        for (index, skeleton) in some {
             let (value, gradient) = skeleton.value_gradient(p);
             if value != 0.0 {
                 active.push((index, value));
@@ -89,6 +100,56 @@ fn grouped_gradient(skeletons: &[Placed], graph: &Graph, p: &Vec3) -> (f64, Vec3
         let value = graph.combine(active, Order::Slopes, work);
         (value, gradients.iter().zip(&work.slopes).map(|(gradient, slope)| gradient * *slope).sum())
     })
+}
+
+/// Points of [`evaluate`] that are worked on together.
+const CHUNK: usize = 64;
+
+/// Field values and gradients of all skeletons together at many points, as [`lanes::evaluate`] gives them where all add
+/// up: same input, same bits, for any grouping of the points into calls.
+///
+/// # Panics
+///
+/// When `values` or `gradients` is not as long as `points`.
+pub fn evaluate(
+    skeletons: &[Placed],
+    graph: &Graph,
+    points: &[[f64; 3]],
+    mut values: Option<&mut [f64]>,
+    mut gradients: Option<&mut [[f64; 3]]>,
+) {
+    if graph.is_complete() {
+        return lanes::evaluate(skeletons, points, values, gradients);
+    }
+    let order = if gradients.is_some() { Order::Slopes } else { Order::Value };
+    let (mut fields, mut slopes) = ([0.0; CHUNK], [[0.0; 3]; CHUNK]);
+    SCRATCH.with_borrow_mut(|Scratch { work, lists, .. }| {
+        lists.resize_with(CHUNK, Default::default);
+        for (index, chunk) in points.chunks(CHUNK).enumerate() {
+            lists.iter_mut().for_each(|(active, slopes)| (active.clear(), slopes.clear()).1);
+            let (fields, slopes) = (&mut fields[..chunk.len()], &mut slopes[..chunk.len()]);
+            for (index, skeleton) in skeletons.iter().enumerate() {
+                let wanted = (order == Order::Slopes).then_some(&mut *slopes);
+                lanes::evaluate(std::slice::from_ref(skeleton), chunk, Some(fields), wanted);
+                for ((field, slope), list) in fields.iter().zip(&*slopes).zip(&mut *lists) {
+                    if *field != 0.0 {
+                        list.0.push((index, *field));
+                        list.1.push(*slope);
+                    }
+                }
+            }
+            for (point, (active, slopes)) in (index * CHUNK..).zip(&lists[..chunk.len()]) {
+                let value = graph.combine(active, order, work);
+                if let Some(values) = &mut values {
+                    values[point] = value;
+                }
+                if let Some(gradients) = &mut gradients {
+                    let each = slopes.iter().zip(&work.slopes).map(|(slope, by)| Vec3::from(*slope) * *by);
+                    gradients[point] = each.sum::<Vec3>().into();
+                }
+            }
+        }
+    });
 }
 
 /// Field value, gradient and Hessian of all skeletons together.
@@ -107,7 +168,7 @@ pub fn value_gradient_hessian(skeletons: &[Placed], graph: &Graph, p: &Vec3) -> 
 }
 
 fn grouped_hessian(skeletons: &[Placed], graph: &Graph, p: &Vec3) -> (f64, Vec3, Mat3) {
-    SCRATCH.with_borrow_mut(|Scratch { active, gradients, hessians, work }| {
+    SCRATCH.with_borrow_mut(|Scratch { active, gradients, hessians, work, .. }| {
         active.clear();
         gradients.clear();
         hessians.clear();

@@ -187,16 +187,18 @@ impl Graph {
                 out.cliques.extend(self.cliques_of(level, *skeleton as usize));
             }
             out.starts.push(out.cliques.len() as u32);
-            // One clique that has all of them, and their sum is the most.
-            let [first, others @ ..] = skeletons else { continue };
-            let has_all = |clique: &u32| {
-                others.iter().all(|other| self.cliques_of(level, *other as usize).binary_search(clique).is_ok())
-            };
-            apart |= !self.cliques_of(level, *first as usize).iter().any(has_all);
+            apart |= !self.add_up(level, skeletons.iter().map(|skeleton| *skeleton as usize));
         }
         if !apart {
             out.clear();
         }
+    }
+
+    /// Whether one clique of a level has all of these skeletons: then their sum is the most.
+    fn add_up(&self, level: usize, mut skeletons: impl Iterator<Item = usize> + Clone) -> bool {
+        let Some(first) = skeletons.next() else { return true };
+        let has = |skeleton: usize, clique: &u32| self.cliques_of(level, skeleton).binary_search(clique).is_ok();
+        self.cliques_of(level, first).iter().any(|clique| skeletons.clone().all(|other| has(other, clique)))
     }
 
     /// Whether two skeletons blend on a level.
@@ -224,6 +226,11 @@ impl Graph {
         }
         let mut value = 0.0;
         for (level, Level { share, count }) in self.levels.iter().enumerate() {
+            if self.add_up(level, active.iter().map(|(skeleton, _)| *skeleton)) {
+                value += share * active.iter().map(|(_, value)| value).sum::<f64>();
+                work.slopes.iter_mut().for_each(|slope| *slope += share);
+                continue;
+            }
             value += share * self.combine_level(level, *count as usize, active, work);
             if order == Order::Value {
                 continue;

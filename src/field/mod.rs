@@ -11,5 +11,5 @@ pub mod separation;
 pub mod skeleton;
 
 pub use graph::Graph;
-pub use profile::Profile;
+pub use profile::{Outer, Profile};
 pub use skeleton::{Placed, Shape};

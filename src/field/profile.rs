@@ -41,7 +41,49 @@ pub struct Jet {
     pub curvature: f64,
 }
 
+/// The outer piece of a profile, with what does not depend on the distance worked out.
+#[derive(Clone, Copy, Debug)]
+pub struct Outer {
+    thickness: f64,
+    radius: f64,
+    inverse_width: f64,
+    a: f64,
+    b: f64,
+}
+
+impl Outer {
+    /// Distance of the surface \[m\].
+    pub fn thickness(&self) -> f64 {
+        self.thickness
+    }
+
+    /// Distance where the field ends \[m\].
+    pub fn radius(&self) -> f64 {
+        self.radius
+    }
+
+    /// `F`, `F'` at a distance larger than the thickness; `None` for others.
+    #[inline(always)]
+    pub fn value_slope(&self, d: f64) -> Option<(f64, f64)> {
+        if d <= self.thickness {
+            return None;
+        }
+        let u = (self.radius - d) * self.inverse_width;
+        let u = if u > 0.0 { u } else { 0.0 };
+        Some((u * u * (self.a + self.b * u), -u * (2.0 * self.a + 3.0 * self.b * u) * self.inverse_width))
+    }
+}
+
 impl Profile {
+    /// Its outer piece, for many distances.
+    #[inline]
+    pub fn outer(&self) -> Outer {
+        let width = self.radius - self.thickness;
+        let kw = self.stiffness * width;
+        let (a, b) = (3.0 * self.isovalue - kw, kw - 2.0 * self.isovalue);
+        Outer { thickness: self.thickness, radius: self.radius, inverse_width: 1.0 / width, a, b }
+    }
+
     /// Checks the ranges; `solid` skeletons have a signed distance and need no cap.
     ///
     /// `stiffness` 0 stands for `2 c / (R - t)`, which makes the outer piece a parabola with the smallest curvature;

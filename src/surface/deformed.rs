@@ -82,7 +82,7 @@ type Jet = (f64, Vec3);
 const NOTHING: Jet = (0.0, Vec3::new(0.0, 0.0, 0.0));
 
 /// A coat and what presses on it: the solid is where [`Deformed::excess`] is not negative.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Deformed {
     /// The undeformed coat.
     pub coat: Coat,

@@ -5,7 +5,10 @@ pub mod closest;
 pub mod deformed;
 pub mod mesh;
 pub mod patches;
+pub mod prepared;
 pub mod ray;
+pub mod skin;
+pub mod tree;
 
 use crate::math::Vec3;
 

@@ -6,15 +6,23 @@
 //! jumps over empty space at once, is exact against flat faces, and doubles the digits near a root like Newton's.
 //! Where several fields overlap, very short steps along a grazing ray give way to a stride of 1/1024 of the thinnest
 //! field and a bracketed root.
+//!
+//! [`cast`] looks at all skeletons; a [`Caster`] is made ready once for many rays, and sorts the skeletons into a tree.
 
 use super::SurfaceHit;
+use super::tree::Tree;
 use crate::coat::Coat;
 use crate::coat::root::bracketed;
-use crate::field::{Placed, Shape, blend};
+use crate::field::{Outer, Placed, Shape, blend};
 use crate::math::Vec3;
 
 /// Shortest stride through overlapping fields, as a fraction of the smallest radius of influence among them.
 const STRIDE: f64 = 1.0 / 1024.0;
+/// Rounding of a sum of fields, over the isovalue.
+const ROUNDING: f64 = 1e-14;
+/// A Newton's step over the shortest stride that needs none after it: its square, over a radius of influence, is 1e-13
+/// of that.
+const SETTLED: f64 = 3e-4;
 
 /// Follows a ray to the first point where the coat's field reaches the isovalue.
 ///
@@ -22,15 +30,10 @@ const STRIDE: f64 = 1.0 / 1024.0;
 /// starts in the solid meets it at distance 0. `None` if the ray does not meet the coat within its length. A chord
 /// through a blend that is shorter than 1/1024 of a radius of influence may be missed; single skeletons are exact.
 pub fn cast(coat: &Coat, origin: &Vec3, direction: &Vec3, length: f64) -> Option<SurfaceHit> {
-    let (ray, abreast) = Line::abreast(coat, origin, direction, length);
-    let s = first_root(coat, &ray, -abreast, length - abreast)?;
-    let position = ray.at(s);
-    Some(SurfaceHit {
-        distance: (abreast + s).max(0.0),
-        position,
-        normal: coat.normal(&position, &-direction),
-        skeleton: blend::territory(&coat.skeletons, &position),
-    })
+    let (line, abreast) = Line::abreast(coat, origin, direction, length);
+    let mut work = Work::default();
+    (0..coat.skeletons.len() as u32).for_each(|k| work.meet(coat, k, &line, -abreast, length - abreast));
+    work.hit(coat, &line, abreast, length)
 }
 
 /// Whether a ray comes within reach of a coat's field: cheaper than [`cast`], and true wherever that finds something.
@@ -38,6 +41,35 @@ pub fn enters(coat: &Coat, origin: &Vec3, direction: &Vec3, length: f64) -> bool
     let (ray, abreast) = Line::abreast(coat, origin, direction, length);
     let enter = |k: &Placed| ray.entry(&k.shape, k.profile.radius, -abreast, length - abreast);
     coat.skeletons.iter().any(|k| enter(k).is_some())
+}
+
+/// A coat's skeletons in a tree, for many rays against one coat; with the memory that rays use again.
+#[derive(Debug, Default)]
+pub struct Caster {
+    tree: Tree,
+    middle: Vec3,
+    work: Work,
+}
+
+impl Caster {
+    /// Makes it ready for this coat.
+    pub fn prepare(&mut self, coat: &Coat) {
+        self.tree.build_of(coat);
+        self.middle = middle(coat);
+    }
+
+    /// The skeletons of the coat.
+    pub fn tree(&self) -> &Tree {
+        &self.tree
+    }
+
+    /// [`cast`] against the coat that it was made ready for.
+    pub fn cast(&mut self, coat: &Coat, origin: &Vec3, direction: &Vec3, length: f64) -> Option<SurfaceHit> {
+        let (line, abreast) = Line::abreast_of(&self.middle, origin, direction, length);
+        let Self { tree, work, .. } = self;
+        tree.meet(origin, direction, length, |k, _| work.meet(coat, k, &line, -abreast, length - abreast));
+        work.hit(coat, &line, abreast, length)
+    }
 }
 
 /// A point in the middle of the bounded skeletons, or on the first plane.
@@ -58,7 +90,11 @@ impl Line {
     /// The line of a ray, and how far along the ray its base is: distances run from the point of the ray that is
     /// abreast of the body, as far away they would lose digits.
     pub(super) fn abreast(coat: &Coat, origin: &Vec3, direction: &Vec3, length: f64) -> (Self, f64) {
-        let abreast = (middle(coat) - origin).dot(direction).clamp(0.0, length);
+        Self::abreast_of(&middle(coat), origin, direction, length)
+    }
+
+    fn abreast_of(middle: &Vec3, origin: &Vec3, direction: &Vec3, length: f64) -> (Self, f64) {
+        let abreast = (middle - origin).dot(direction).clamp(0.0, length);
         (Self { base: origin + direction * abreast, direction: *direction }, abreast)
     }
 
@@ -92,113 +128,297 @@ impl Line {
     }
 }
 
-/// A skeleton whose field the line is in: tangent of its distance.
-struct Term<'a> {
-    position: usize,
-    skeleton: &'a Placed,
-    distance: f64,
-    slope: f64,
+/// A skeleton whose field a line meets.
+#[derive(Clone, Copy, Debug)]
+struct Passage {
+    /// Where the line comes within reach.
+    entry: f64,
+    position: u32,
+    /// Whether its distance has a sign.
+    solid: bool,
+    /// Of a point: where the line is abreast of it, and the square of its distance there.
+    point: Option<(f64, f64)>,
 }
 
-impl Term<'_> {
-    /// The most the field can be after `h` more metres.
-    fn bound(&self, h: f64) -> f64 {
-        let mut distance = if self.slope < 0.0 { self.distance + self.slope * h } else { self.distance };
-        if !self.skeleton.shape.is_solid() {
-            distance = distance.max(0.0);
+impl Passage {
+    /// `None` if the line does not come within reach between `start` and `end`.
+    #[inline]
+    fn new(skeleton: &Placed, position: u32, line: &Line, start: f64, end: f64) -> Option<Self> {
+        let radius = skeleton.profile.radius;
+        let Shape::Point(center) = &skeleton.shape else {
+            let entry = line.entry(&skeleton.shape, radius, start, end)?;
+            return Some(Self { entry, position, solid: skeleton.shape.is_solid(), point: None });
+        };
+        let offset = center - line.base;
+        let abreast = offset.dot(&line.direction);
+        let square = (offset - line.direction * abreast).norm_squared();
+        if square >= radius * radius {
+            return None;
         }
-        self.skeleton.profile.value_slope(distance).0
+        let half = (radius * radius - square).sqrt();
+        let entry = (abreast - half).max(start);
+        let point = Some((abreast, square));
+        (entry <= end && abreast + half > start).then_some(Self { entry, position, solid: false, point })
+    }
+
+    /// Distance of the line from the skeleton at `s`, and its slope along the line.
+    #[inline]
+    fn tangent(&self, coat: &Coat, line: &Line, s: f64) -> (f64, f64) {
+        let Some((abreast, square)) = self.point else {
+            return line.tangent(&coat.skeletons[self.position as usize].shape, s);
+        };
+        let along = s - abreast;
+        let distance = (along * along + square).sqrt();
+        (distance, if distance > 0.0 { along / distance } else { 0.0 })
+    }
+}
+
+/// A skeleton whose field the line is in.
+#[derive(Clone, Copy, Debug)]
+struct Term {
+    passage: Passage,
+    outer: Outer,
+    /// Tangent of the distance.
+    distance: f64,
+    slope: f64,
+    /// Its field, and what that gains per metre along the line.
+    value: f64,
+    rise: f64,
+}
+
+impl Term {
+    fn new(passage: &Passage, coat: &Coat) -> Self {
+        let outer = coat.skeletons[passage.position as usize].profile.outer();
+        Self { passage: *passage, outer, distance: 0.0, slope: 0.0, value: 0.0, rise: 0.0 }
+    }
+
+    fn skeleton<'a>(&self, coat: &'a Coat) -> &'a Placed {
+        &coat.skeletons[self.passage.position as usize]
+    }
+
+    #[inline]
+    fn value_slope(&self, coat: &Coat, distance: f64) -> (f64, f64) {
+        self.outer.value_slope(distance).unwrap_or_else(|| self.skeleton(coat).profile.value_slope(distance))
+    }
+
+    /// Takes the tangent at `s`; whether the field may still rise beyond.
+    #[inline]
+    fn touch(&mut self, coat: &Coat, line: &Line, s: f64) -> bool {
+        (self.distance, self.slope) = self.passage.tangent(coat, line, s);
+        let (value, gain) = self.value_slope(coat, self.distance);
+        (self.value, self.rise) = (value, gain * self.slope);
+        // Convexity: a line that leaves the support of a field never comes back to it.
+        self.distance < self.outer.radius() || self.slope < 0.0
+    }
+
+    /// The field at `s`.
+    #[inline]
+    fn value_at(&self, coat: &Coat, line: &Line, s: f64) -> f64 {
+        self.value_slope(coat, self.passage.tangent(coat, line, s).0).0
+    }
+
+    /// The field at `s`, and what it gains per metre.
+    #[inline]
+    fn jet_at(&self, coat: &Coat, line: &Line, s: f64) -> (f64, f64) {
+        let (distance, slope) = self.passage.tangent(coat, line, s);
+        let (value, gain) = self.value_slope(coat, distance);
+        (value, gain * slope)
+    }
+
+    /// The most the field can be after `h` more metres.
+    #[inline]
+    fn bound(&self, coat: &Coat, h: f64) -> f64 {
+        if self.slope >= 0.0 {
+            return self.value;
+        }
+        let distance = self.distance + self.slope * h;
+        // Thin skeletons have no negative distances.
+        self.value_slope(coat, if self.passage.solid { distance } else { distance.max(0.0) }).0
     }
 
     /// Length after which the tangent reaches the skeleton's own surface.
+    #[inline]
     fn length_to_surface(&self) -> f64 {
-        if self.slope < 0.0 { (self.distance - self.skeleton.profile.thickness) / -self.slope } else { f64::INFINITY }
+        if self.slope < 0.0 { (self.distance - self.outer.thickness()) / -self.slope } else { f64::INFINITY }
     }
 }
 
-/// The first `s` in `[start, end)` where the field reaches the isovalue.
-fn first_root(coat: &Coat, line: &Line, start: f64, end: f64) -> Option<f64> {
-    let enter = |skeleton: &Placed| line.entry(&skeleton.shape, skeleton.profile.radius, start, end);
-    let skeletons = coat.skeletons.iter().enumerate();
-    let mut entries: Vec<(f64, usize)> = skeletons.filter_map(|(position, k)| Some((enter(k)?, position))).collect();
-    entries.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut entries = entries.into_iter().peekable();
-    let mut active: Vec<usize> = Vec::new();
-    let mut terms: Vec<Term> = Vec::new();
-    let mut s = start;
-    // Where it last was outside, when steps may go too far.
-    let mut outside: Option<(f64, f64)> = None;
-    loop {
-        if active.is_empty() {
-            s = s.max(entries.peek()?.0);
-        }
-        while let Some((_, position)) = entries.next_if(|entry| entry.0 <= s) {
-            active.push(position);
-        }
-        terms.clear();
-        // Convexity: a line that leaves the support of a field never comes back to it.
-        active.retain(|position| {
-            let skeleton = &coat.skeletons[*position];
-            let (distance, slope) = line.tangent(&skeleton.shape, s);
-            let keep = distance < skeleton.profile.radius || slope < 0.0;
-            if keep {
-                terms.push(Term { position: *position, skeleton, distance, slope });
+/// Memory of a ray.
+#[derive(Debug, Default)]
+struct Work {
+    /// The skeletons whose fields the line meets, in the order of their entries.
+    passages: Vec<Passage>,
+    /// Those of them whose fields it is in.
+    terms: Vec<Term>,
+}
+
+impl Work {
+    /// Takes a skeleton in, if the line meets its field.
+    #[inline]
+    fn meet(&mut self, coat: &Coat, position: u32, line: &Line, start: f64, end: f64) {
+        self.passages.extend(Passage::new(&coat.skeletons[position as usize], position, line, start, end));
+    }
+
+    /// The first point of the surface on a ray whose skeletons have been taken in; afterwards there are none.
+    fn hit(&mut self, coat: &Coat, line: &Line, abreast: f64, length: f64) -> Option<SurfaceHit> {
+        self.passages.sort_unstable_by(|a, b| a.entry.total_cmp(&b.entry).then(a.position.cmp(&b.position)));
+        let root = self.first_root(coat, line, -abreast, length - abreast);
+        self.passages.clear();
+        let s = root?;
+        let position = line.at(s);
+        let terms = || self.terms.iter().map(|term| (term.passage.position as usize, term.skeleton(coat)));
+        let (mut territory, mut gradient) = ((0, f64::NEG_INFINITY), Vec3::zeros());
+        for (index, skeleton) in terms() {
+            let (value, slope) = skeleton.value_gradient(&position);
+            gradient += slope;
+            if value > territory.1 || value == territory.1 && index < territory.0 {
+                territory = (index, value);
             }
-            keep
-        });
-        let level = coat.isovalue - coat.graph.rise();
-        let bound = |h: f64| terms.iter().map(|term| term.bound(h)).sum::<f64>() - level;
-        let excess_at = |x: f64| {
-            let p = line.at(x);
-            let fields = terms.iter().map(|term| (term.position, term.skeleton.value(&p)));
-            blend::together(&coat.graph, fields) - coat.isovalue
-        };
-        // Where not all fields add up, their sum is a bound only.
-        let most = bound(0.0);
-        let excess = if coat.graph.is_complete() { most } else { excess_at(s) };
-        if excess >= 0.0 {
-            let Some((before, excess_before)) = outside else { return Some(s) };
-            return Some(bracketed(before, s, -excess_before, -excess, |x| -coat.excess(&line.at(x))));
         }
         if !coat.graph.is_complete() {
-            outside = Some((s, excess));
+            gradient = blend::gradient_of(&coat.graph, terms(), &position);
         }
-        let event = entries.peek().map_or(end, |entry| entry.0);
-        let room = terms.iter().map(Term::length_to_surface).fold(event - s, f64::min);
-        // On the tangent of a single field the bound reaches the isovalue exactly at the end of the room.
-        let at_room = if terms.len() == 1 { 0.0 } else { bound(room) };
-        let step = if most >= 0.0 {
-            0.0
-        } else if at_room <= 0.0 {
-            room
-        } else {
-            bracketed(0.0, room, -most, -at_room, |h| -bound(h))
-        };
-        // Nor does the field rise faster than all slopes together, or hardly so: a step too far is noticed.
-        let slopes = || terms.iter().map(|term| term.skeleton.profile.lipschitz()).sum::<f64>();
-        let step = if coat.graph.is_complete() { step } else { step.max((-excess / slopes()).min(event - s)) };
-        if step >= event - s {
-            if event >= end {
-                return None;
+        let normal = (-gradient).try_normalize(0.0).unwrap_or(-line.direction);
+        Some(SurfaceHit { distance: (abreast + s).max(0.0), position, normal, skeleton: territory.0 })
+    }
+
+    /// The first `s` in `[start, end)` where the field reaches the isovalue; the terms are then those that may have a
+    /// field there.
+    fn first_root(&mut self, coat: &Coat, line: &Line, start: f64, end: f64) -> Option<f64> {
+        let Self { passages, terms } = self;
+        let complete = coat.graph.is_complete();
+        terms.clear();
+        let mut next = 0;
+        let mut s = start;
+        // Where it last was outside, when steps may go too far.
+        let mut outside: Option<(f64, f64)> = None;
+        loop {
+            if terms.is_empty() {
+                s = s.max(passages.get(next)?.entry);
             }
-            s = event;
-            continue;
-        }
-        let stride = terms.iter().map(|term| STRIDE * term.skeleton.profile.radius).fold(f64::INFINITY, f64::min);
-        if terms.len() > 1 && step < stride {
-            let ahead = (s + stride).min(event);
-            let at_ahead = excess_at(ahead);
-            if at_ahead >= 0.0 {
-                return Some(bracketed(s, ahead, -excess, -at_ahead, |x| -excess_at(x)));
+            while let Some(passage) = passages.get(next).filter(|passage| passage.entry <= s) {
+                terms.push(Term::new(passage, coat));
+                next += 1;
             }
-            if ahead >= end {
-                return None;
+            let mut sum = 0.0;
+            terms.retain_mut(|term| {
+                let keep = term.touch(coat, line, s);
+                sum += term.value;
+                keep
+            });
+            // Zero where it is lost in rounding: roots end there.
+            let excess_at = |terms: &[Term], x: f64| {
+                let value = |term: &Term| term.value_at(coat, line, x);
+                let value = if complete {
+                    terms.iter().map(value).sum()
+                } else {
+                    let fields = terms.iter().map(|term| (term.passage.position as usize, value(term)));
+                    blend::together(&coat.graph, fields)
+                };
+                let excess = value - coat.isovalue;
+                if excess.abs() <= ROUNDING * coat.isovalue { 0.0 } else { excess }
+            };
+            // Where not all fields add up, their sum is a bound only.
+            let level = coat.isovalue - coat.graph.rise();
+            let most = sum - level;
+            let excess = if complete { most } else { excess_at(terms, s) };
+            if excess >= 0.0 {
+                let Some((before, excess_before)) = outside else { return Some(s) };
+                // Also what it has left since then.
+                terms.clear();
+                let entered = passages[..next].iter();
+                terms.extend(entered.map(|passage| Term::new(passage, coat)));
+                return Some(bracketed(before, s, -excess_before, -excess, |x| -excess_at(terms, x)));
             }
-            s = ahead;
-        } else if step <= 4.0 * f64::EPSILON * (s.abs() + line.at(s).norm()) {
-            return Some(s);
-        } else {
-            s += step;
+            if !complete {
+                outside = Some((s, excess));
+            }
+            let event = passages.get(next).map_or(end, |passage| passage.entry);
+            let radii = terms.iter().map(|term| STRIDE * term.outer.radius());
+            let stride = radii.fold(f64::INFINITY, f64::min);
+            if complete && terms.len() > 1 {
+                let jet = |x: f64| {
+                    terms.iter().fold((-coat.isovalue, 0.0), |sum, term| {
+                        let (value, rise) = term.jet_at(coat, line, x);
+                        (sum.0 + value, sum.1 + rise)
+                    })
+                };
+                let rise = terms.iter().map(|term| term.rise).sum();
+                if let Some(root) = close_root(s, stride.min(event - s), (excess, rise), jet) {
+                    return Some(root);
+                }
+            }
+            let surface = terms.iter().map(Term::length_to_surface);
+            let room = surface.fold(event - s, f64::min);
+            let bound = |h: f64| terms.iter().map(|term| term.bound(coat, h)).sum::<f64>() - level;
+            let step = if most >= 0.0 {
+                0.0
+            } else if terms.len() <= 1 {
+                // On the tangent of a single field the bound reaches the isovalue exactly at the end of the room.
+                room
+            } else {
+                safe_step(room, most, terms.iter().map(|term| term.rise.max(0.0)).sum(), bound)
+            };
+            // Nor does the field rise faster than all slopes together, or hardly so: a step too far is noticed.
+            let slopes = || terms.iter().map(|term| term.skeleton(coat).profile.lipschitz()).sum::<f64>();
+            let step = if complete { step } else { step.max((-excess / slopes()).min(event - s)) };
+            if step >= event - s {
+                if event >= end {
+                    return None;
+                }
+                s = event;
+                continue;
+            }
+            if terms.len() > 1 && step < stride {
+                let ahead = (s + stride).min(event);
+                let at_ahead = excess_at(terms, ahead);
+                if at_ahead >= 0.0 {
+                    return Some(bracketed(s, ahead, -excess, -at_ahead, |x| -excess_at(terms, x)));
+                }
+                if ahead >= end {
+                    return None;
+                }
+                s = ahead;
+            } else if step <= 4.0 * f64::EPSILON * (s.abs() + line.at(s).norm()) {
+                return Some(s);
+            } else {
+                s += step;
+            }
         }
     }
+}
+
+/// A root no farther on than `room`, by Newton's steps, if they go straight to it; `jet` is value and slope.
+fn close_root(start: f64, room: f64, mut at: (f64, f64), jet: impl Fn(f64) -> (f64, f64)) -> Option<f64> {
+    let (low, high) = (start, start + room);
+    let mut s = start;
+    let mut last = room;
+    for _ in 0..8 {
+        let step = -at.0 / at.1;
+        s += step;
+        // Also when there is no slope: then it is no number.
+        if !(at.1 > 0.0 && step.abs() <= last && s >= low && s <= high) {
+            return None;
+        }
+        if step.abs() <= SETTLED * room {
+            return Some(s);
+        }
+        last = 0.5 * step.abs();
+        at = jet(s);
+    }
+    None
+}
+
+/// A step within the room along which a rising bound, with this value and slope at its beginning, stays negative: near
+/// the longest one if the bound is convex.
+fn safe_step(room: f64, most: f64, slope: f64, bound: impl Fn(f64) -> f64) -> f64 {
+    let mut high = if slope > 0.0 { room.min(-most / slope) } else { room };
+    for _ in 0..6 {
+        let at_high = bound(high);
+        if at_high <= 0.0 {
+            return high;
+        }
+        high *= most / (most - at_high);
+    }
+    0.0
 }

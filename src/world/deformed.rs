@@ -23,6 +23,26 @@ pub enum Deformation {
 }
 
 impl World {
+    /// A body's coat with what presses on it, and the arena indices of its skeletons. Undeformed it takes the memory of
+    /// `posed`, whose coat is to be put back, and asks for no more.
+    pub(super) fn shape_of<'a>(
+        &self,
+        index: usize,
+        deformation: Deformation,
+        posed: &'a mut PosedCoat,
+    ) -> (Deformed, &'a [usize]) {
+        if deformation != Deformation::None {
+            let (deformed, skeletons) = self.deformed_coat(index, deformation);
+            posed.skeletons = skeletons;
+            return (deformed, &posed.skeletons);
+        }
+        let body = &self.bodies[index];
+        let pose_of = |link: &u32| self.links[*link as usize].desc.pose;
+        posed.coat.origin = body.links.first().map_or(Vec3::zeros(), |link| pose_of(link).position);
+        self.fill_coat(body, body.links.iter().map(pose_of), posed);
+        (Deformed { coat: std::mem::take(&mut posed.coat), obstacles: Vec::new() }, &posed.skeletons)
+    }
+
     /// A body's coat as its contacts at the present poses deform it, with the arena indices of its skeletons. Obstacles
     /// are the enabled bodies whose fields reach it and whose masks agree; the pair filter is not asked, as it may change.
     pub(super) fn deformed_coat(&self, index: usize, deformation: Deformation) -> (Deformed, Vec<usize>) {

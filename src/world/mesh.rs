@@ -74,16 +74,7 @@ impl World {
     ) -> Result<()> {
         self.bodies.get(body)?;
         let MeshWorkspace { posed, scratch, mesh, .. } = workspace;
-        let deformed = match desc.deformation {
-            Deformation::None => {
-                let body = &self.bodies[body.index()];
-                let pose_of = |link: &u32| self.links[*link as usize].desc.pose;
-                posed.coat.origin = body.links.first().map_or(Vec3::zeros(), |link| pose_of(link).position);
-                self.fill_coat(body, body.links.iter().map(pose_of), posed);
-                Deformed { coat: std::mem::take(&mut posed.coat), obstacles: Vec::new() }
-            }
-            deformation => self.deformed_coat(body.index(), deformation).0,
-        };
+        let (deformed, _) = self.shape_of(body.index(), desc.deformation, posed);
         let result = mesh_of(&deformed, desc.cell_size, scratch, mesh, out);
         posed.coat = deformed.coat;
         result

@@ -14,9 +14,11 @@ mod gather;
 pub mod mesh;
 mod motion;
 pub mod query;
+pub mod rays;
 pub mod recording;
 mod respond;
 pub mod sight;
+pub mod skin;
 mod sleep;
 mod snapshot;
 mod springs;
@@ -34,6 +36,7 @@ pub use desc::{
 pub use events::{Contact, Counters, Event, EventKind, LogLevel, Tally, Times};
 pub use motion::LinkState;
 pub use recording::{Playback, Recorder, RecorderDesc};
+pub use skin::SkinId;
 pub use springs::{Spring, SpringState};
 pub use substance::{Change, Fill, Particle, ParticleId, Piece, SubstanceDesc};
 
@@ -129,6 +132,8 @@ pub struct World {
     links: Arena<Link>,
     skeletons: Arena<Skeleton>,
     springs: Arena<Spring>,
+    /// No part of snapshots.
+    skins: Arena<skin::Skin>,
     log: Alone<Option<Log>>,
     pair_filter: Alone<Option<PairFilter>>,
     tasks: Alone<Option<Box<dyn Tasks>>>,
@@ -152,6 +157,7 @@ impl World {
             links: Arena::new(tag),
             skeletons: Arena::new(tag),
             springs: Arena::new(tag),
+            skins: Arena::new(tag),
             log: Alone::default(),
             pair_filter: Alone::default(),
             tasks: Alone::default(),

@@ -1,7 +1,7 @@
 //! Questions between steps: fields, rays, overlaps, closest points, seeds.
 
+use super::rays::Ray;
 use super::{Body, BodyId, Deformation, LinkId, SkeletonId, World};
-use crate::coat::seeds::Ray;
 use crate::coat::{Coat, seeds, territory};
 use crate::error::{Error, Result, out_of_range, require, require_finite};
 use crate::math::{Pose, Vec3};
@@ -123,7 +123,7 @@ impl World {
     }
 
     /// What a part of a coat belongs to; a particle to neither.
-    fn skeleton_and_link(&self, skeletons: &[usize], part: usize) -> (SkeletonId, LinkId) {
+    pub(super) fn skeleton_and_link(&self, skeletons: &[usize], part: usize) -> (SkeletonId, LinkId) {
         let Some(&index) = skeletons.get(part) else { return Default::default() };
         (self.skeletons.id_of(index), self.links.id_of(self.skeletons[index].link as usize))
     }
@@ -204,6 +204,7 @@ impl World {
         mask: u64,
         deformation: Deformation,
     ) -> Result<Option<RayHit>> {
+        let ray = Ray { origin: *origin, direction: *direction, max_distance };
         let hit_of = |body: usize, direction: &Vec3, length: f64| {
             let posed = self.posed_coat(body);
             let local = posed.localise(origin);
@@ -216,7 +217,7 @@ impl World {
             };
             Some(self.ray_hit(body, &posed.coat.origin, &posed.skeletons, hit?))
         };
-        first_hit(origin, direction, max_distance, self.bodies_of(mask), hit_of)
+        first_hit(&ray, self.bodies_of(mask), hit_of)
     }
 
     /// A hit of a body, whose coat is in a frame at `origin`, as the world has it.
@@ -296,7 +297,7 @@ impl World {
         let count = if desc.seed_count == 0 { self.desc.seed_count } else { desc.seed_count };
         seeds::rays(&desc.shape, desc.thickness, count as usize, &mut followed.rays);
         let pose = posed.poses[index];
-        let rays: Vec<Ray> = followed.rays.iter().map(|ray| ray.transformed(&pose)).collect();
+        let rays: Vec<seeds::Ray> = followed.rays.iter().map(|ray| ray.transformed(&pose)).collect();
         territory::seeds(&posed.coat, index, &rays, &mut followed.seeds);
         Ok(followed)
     }
@@ -304,22 +305,13 @@ impl World {
 
 /// The first hit of a ray among bodies, in the order of their ids; `hit_of` casts it, with a unit direction.
 pub(super) fn first_hit<B>(
-    origin: &Vec3,
-    direction: &Vec3,
-    max_distance: f64,
+    ray: &Ray,
     bodies: impl Iterator<Item = B>,
     hit_of: impl Fn(B, &Vec3, f64) -> Option<RayHit>,
 ) -> Result<Option<RayHit>> {
-    require_finite("ray origin", origin)?;
-    require_finite("ray direction", direction)?;
-    // Scaled first, so that no square overflows or vanishes.
-    let largest = direction.amax();
-    require("length of the ray direction", largest, "> 0", |x| x > 0.0)?;
-    if max_distance.is_nan() || max_distance < 0.0 {
-        return Err(out_of_range("max_distance", max_distance, "at least 0 (infinity is fine)"));
-    }
-    let direction = (direction / largest).normalize();
-    let mut length = max_distance;
+    ray.check()?;
+    let direction = ray.unit_direction();
+    let mut length = ray.max_distance;
     let mut first = None;
     for body in bodies {
         let Some(hit) = hit_of(body, &direction, length) else { continue };
@@ -338,6 +330,6 @@ pub(super) fn first_hit<B>(
 #[derive(Default)]
 pub(super) struct Followed {
     pub(super) origin: Vec3,
-    pub(super) rays: Vec<Ray>,
+    pub(super) rays: Vec<seeds::Ray>,
     pub(super) seeds: Vec<territory::Seed>,
 }

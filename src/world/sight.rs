@@ -1,6 +1,7 @@
 //! The coats of a world made ready for many rays, as a picture takes them.
 
 use super::query::{RayHit, first_hit};
+use super::rays::Ray;
 use super::{BodyId, Deformation, World};
 use crate::error::{Result, require_finite};
 use crate::math::Vec3;
@@ -53,7 +54,8 @@ impl Sight<'_> {
 
     /// The first coat that a ray meets, as [`World::cast_ray_deformed`] gives it.
     pub fn cast_ray(&self, origin: &Vec3, direction: &Vec3, max_distance: f64) -> Result<Option<RayHit>> {
-        first_hit(origin, direction, max_distance, self.coats.iter(), |seen: &Seen, direction, length| {
+        let ray = Ray { origin: *origin, direction: *direction, max_distance };
+        first_hit(&ray, self.coats.iter(), |seen: &Seen, direction, length| {
             let frame = &seen.deformed.coat.origin;
             let local = origin - frame;
             let hit = if self.deformation == Deformation::None {

@@ -251,6 +251,7 @@ pub(super) fn read_parts(from: &mut Reader) -> Result<World> {
         links: read_arena(from)?,
         skeletons: read_arena(from)?,
         springs: read_arena(from)?,
+        skins: Arena::new(0),
         log: Alone::default(),
         pair_filter: Alone::default(),
         tasks: Alone::default(),
@@ -313,6 +314,7 @@ impl World {
             links,
             skeletons,
             springs,
+            skins: _,
             log: _,
             pair_filter: _,
             tasks: _,
@@ -371,6 +373,8 @@ impl World {
             // Of the same origin are only those snapshots that this world takes from now on.
             fresh.origin = new_origin();
             std::mem::swap(&mut self.own_tag, &mut fresh.own_tag);
+            // No skin of the bodies that were here fits those that come.
+            self.skins = Arena::new(self.own_tag.number());
             self.own_tag.number()
         };
         for id in memories.iter_mut().chain(&mut resting).flat_map(|memory| &mut memory.ids) {
@@ -409,6 +413,7 @@ impl World {
             links,
             skeletons,
             springs,
+            skins: _,
             log: _,
             pair_filter: _,
             tasks: _,

@@ -369,6 +369,26 @@ static void queries()
     CHECK(mesh.view().vertex_count > 0 && mesh.view().valid == nullptr);
     point.make_mesh(mesh);
     CHECK(mesh.positions() == seeds.positions);
+
+    const std::vector<isocoat::vec3> origins = {{0, 0, 5}, {0, 0, 5}}, directions = {{0, 0, -1}, {0, 0, 1}};
+    const std::vector<isocoat::ray_hit> hits = world.cast_rays(origins, directions);
+    CHECK(std::fabs(hits[0].distance - hit->distance) < 1e-12 && hits[0].skeleton.index == hit->skeleton.index);
+    CHECK(std::isinf(hits[1].distance) && hits[1].body.generation == 0);
+    isocoat::skin skin = isocoat::body(bodies[0]).create_skin(mesh.positions(), mesh.normals());
+    CHECK(skin.parent() == bodies[0] && skin.vertex_count() == mesh.positions().size());
+    CHECK(skin.weights(0).size() == 1 && skin.weights(0)[0].second == 1.0);
+    CHECK(skin.positions().size() == skin.vertex_count());
+    std::vector<std::array<float, 6>> vertices(skin.vertex_count());
+    skin.deform(isocoat::buffer(vertices[0].data(), sizeof vertices[0]),
+                isocoat::buffer(vertices[0].data() + 3, sizeof vertices[0]), vertices.size());
+    CHECK(vertices[1][0] == float(skin.positions()[1][0]));
+    skin.destroy();
+    try {
+        skin.positions();
+        CHECK(false);
+    } catch (const isocoat::error &error) {
+        CHECK(error.status() == ISOCOAT_ERROR_INVALID_HANDLE);
+    }
     CHECK(point.volume() == bodies[0].volume() && point.volume() > 0.0 && point.offset() == 0.0);
     try {
         isocoat::skeleton(point).set_target_volume(point.target_volume());

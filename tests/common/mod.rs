@@ -1,6 +1,7 @@
 //! What several tests share: scenes in few words, and an oracle that integrates contact forces in its own way.
 #![allow(dead_code)]
 
+pub mod character;
 pub mod oracle;
 pub mod pool;
 

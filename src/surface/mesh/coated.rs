@@ -2,7 +2,7 @@
 
 use super::{Cubes, Solid, Spans};
 use crate::field::{Graph, Placed, Shape, blend, lanes};
-use crate::math::Vec3;
+use crate::math::{Vec3, ball_round};
 use crate::surface::deformed::{Deformed, Obstacle};
 
 /// Rounding of a sum of fields, over the isovalue: bounds that are closer to it than that decide nothing.
@@ -49,13 +49,7 @@ impl<'a> Coated<'a> {
     }
 
     /// The field of the undeformed coat.
-    fn field(
-        &mut self,
-        parts: &[u32],
-        points: &[[f64; 3]],
-        values: &mut [f64],
-        mut gradients: Option<&mut [[f64; 3]]>,
-    ) {
+    fn field(&mut self, parts: &[u32], points: &[[f64; 3]], values: &mut [f64], gradients: Option<&mut [[f64; 3]]>) {
         let coat = &self.deformed.coat;
         let Scratch { graph, placed, .. } = &mut *self.scratch;
         if coat.graph.is_complete() {
@@ -68,13 +62,7 @@ impl<'a> Coated<'a> {
         }
         placed.clear();
         placed.extend(parts.iter().map(|part| coat.skeletons[*part as usize]));
-        for (index, p) in points.iter().enumerate() {
-            let (value, gradient) = blend::value_gradient(placed, graph, &Vec3::from(*p));
-            values[index] = value;
-            if let Some(gradients) = &mut gradients {
-                gradients[index] = gradient.into();
-            }
-        }
+        blend::evaluate(placed, graph, points, Some(values), gradients);
     }
 }
 
@@ -144,12 +132,4 @@ impl Solid for Coated<'_> {
         }
         self.scratch.gradients = own;
     }
-}
-
-/// A ball that holds all points.
-fn ball_round(points: &[[f64; 3]]) -> (Vec3, f64) {
-    let each = points.iter().map(|p| Vec3::from(*p));
-    let empty = (Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY));
-    let (low, high) = each.fold(empty, |(low, high), p| (low.inf(&p), high.sup(&p)));
-    ((low + high) * 0.5, 0.5 * (high - low).norm())
 }
