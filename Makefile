@@ -117,7 +117,7 @@ demo-plot:
 	@mkdir -p $(OUT)
 	$(CARGO) run --release --quiet --example two_balls_plot -- $(OUT)/two_balls.svg
 
-SCENES := collision clover muscle jelly dough skin sleeve cpp/walk cpp/bullet_character
+SCENES := collision clover muscle jelly dough skin sleeve cpp/bowl cpp/walk cpp/bullet_character
 
 .PHONY: scenes
 scenes: $(SCENES:%=$(WORK)/examples/%) ## characters, muscles, jelly: run each scene, with pictures in out/
