@@ -5,6 +5,8 @@
 set -u
 make=$1
 shift
+# What a stage builds, it builds side by side.
+jobs=-j$(getconf _NPROCESSORS_ONLN)
 mkdir -p "$LOGS"
 
 # What a stage says of itself: the sum of cargo's test results, or its last line.
@@ -21,11 +23,11 @@ for stage in "$@"; do
     printf '%-10s ' "$stage"
     if [ -n "${V:-}" ]; then
         echo
-        { "$make" "test-$stage" 2>&1; echo $? >"$log.status"; } | tee "$log"
+        { "$make" "$jobs" "test-$stage" 2>&1; echo $? >"$log.status"; } | tee "$log"
         status=$(cat "$log.status")
         rm -f "$log.status"
     else
-        "$make" "test-$stage" >"$log" 2>&1
+        "$make" "$jobs" "test-$stage" >"$log" 2>&1
         status=$?
     fi
     took=$(($(date +%s) - begin))
