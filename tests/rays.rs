@@ -104,17 +104,8 @@ fn many_rays_meet_what_each_alone_meets() {
                     .cast_ray_deformed(&ray.origin, &ray.direction, ray.max_distance, u64::MAX, deformation)
                     .unwrap();
                 total += 1;
-                match (hit, alone) {
-                    (Some(hit), Some(alone)) => {
-                        hits += 1;
-                        assert!((hit.distance - alone.distance).abs() < 1e-9, "{hit:?} {alone:?}");
-                        assert!((hit.position - alone.position).norm() < 1e-9);
-                        assert!((hit.normal - alone.normal).norm() < 1e-5 || hit.distance == 0.0, "{hit:?} {alone:?}");
-                        assert_eq!((hit.body, hit.link, hit.skeleton), (alone.body, alone.link, alone.skeleton));
-                    }
-                    (None, None) => {}
-                    other => panic!("{ray:?} {deformation:?}: {other:?}"),
-                }
+                assert_eq!(hit, alone, "to the bit: {ray:?} {deformation:?}");
+                hits += u32::from(hit.is_some());
             }
         }
     }

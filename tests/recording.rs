@@ -12,6 +12,7 @@ use isocoat::error::Error;
 use isocoat::field::Shape;
 use isocoat::math::{Pose, Vec3};
 use isocoat::world::mesh::MeshDesc;
+use isocoat::world::rays::{Ray, RayGoal};
 use isocoat::world::{
     BodyDesc, BodyId, Deformation, Fill, LinkDesc, Playback, Recorder, RecorderDesc, SkeletonDesc, SubstanceDesc,
     World, WorldDesc,
@@ -39,12 +40,13 @@ fn sight(world: &World, cell_size: f64) -> Vec<u64> {
     };
     let mut random = Random(7);
     for deformation in [Deformation::None, Deformation::Contact, Deformation::Bulges] {
-        let ready = world.sight(u64::MAX, deformation);
+        let mut ready = world.sight(u64::MAX, deformation);
         for _ in 0..24 {
             let from = random.direction() * 3.0;
             let to = Vec3::from_fn(|_, _| random.range(-0.3, 0.3));
             let hit = world.cast_ray_deformed(&from, &(to - from), f64::INFINITY, u64::MAX, deformation).unwrap();
-            assert_eq!(ready.cast_ray(&from, &(to - from), f64::INFINITY).unwrap(), hit);
+            let ray = Ray { origin: from, direction: to - from, max_distance: f64::INFINITY };
+            assert_eq!(ready.cast_ray(&ray, RayGoal::Closest).unwrap(), hit);
             out.push(u64::from(hit.is_some()));
             if let Some(hit) = hit {
                 slot(&mut out, hit.body.raw);

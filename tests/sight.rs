@@ -4,6 +4,9 @@ mod common;
 
 use common::{Coat, Random};
 use isocoat::math::{Pose, Vec3};
+use isocoat::world::query::RayHit;
+use isocoat::world::rays::{Ray, RayGoal};
+use isocoat::world::sight::Sight;
 use isocoat::world::{BodyId, Deformation, Scheme, World, WorldDesc};
 
 fn two_balls() -> World {
@@ -14,6 +17,10 @@ fn two_balls() -> World {
     world
 }
 
+fn first(sight: &mut Sight, origin: &Vec3, direction: &Vec3, max_distance: f64) -> Option<RayHit> {
+    sight.cast_ray(&Ray { origin: *origin, direction: *direction, max_distance }, RayGoal::Closest).unwrap()
+}
+
 #[test]
 fn pressure_along_a_contact_is_what_the_contact_says() {
     let world = two_balls();
@@ -21,12 +28,12 @@ fn pressure_along_a_contact_is_what_the_contact_says() {
     let contact = world.collide(bodies[0], bodies[1], Scheme::Auto, 1e-6).unwrap().remove(0);
     let sight = world.sight(u64::MAX, Deformation::Contact);
     // The flat face of the first ball, seen from where the second was.
-    let face = sight.without(bodies[1]);
-    let hit = face.cast_ray(&Vec3::new(1.0, 0.0, 0.0), &-Vec3::x(), 2.0).unwrap().unwrap();
+    let mut face = sight.without(bodies[1]);
+    let hit = first(&mut face, &Vec3::new(1.0, 0.0, 0.0), &-Vec3::x(), 2.0).unwrap();
     assert!((hit.position - Vec3::zeros()).norm() < 1e-9 && (hit.normal - Vec3::x()).norm() < 1e-6);
     assert!((face.pressure(&hit) / contact.peak_pressure - 1.0).abs() < 1e-6);
     // Away from it there is none, but for rounding.
-    let hit = face.cast_ray(&Vec3::new(-1.0, 0.0, 0.0), &Vec3::x(), 2.0).unwrap().unwrap();
+    let hit = first(&mut face, &Vec3::new(-1.0, 0.0, 0.0), &Vec3::x(), 2.0).unwrap();
     assert!(face.pressure(&hit) < 1e-9 * contact.peak_pressure);
     // The sum over the disc is the force: rays in rings of equal area.
     let radius = (0.1_f64.powi(2) - 0.08_f64.powi(2)).sqrt();
@@ -34,7 +41,8 @@ fn pressure_along_a_contact_is_what_the_contact_says() {
     let ring = |k: i32| {
         let (r, turn) = (radius * ((f64::from(k) + 0.5) / f64::from(count)).sqrt(), 2.4 * f64::from(k));
         let from = Vec3::new(1.0, r * turn.cos(), r * turn.sin());
-        face.pressure(&face.cast_ray(&from, &-Vec3::x(), 2.0).unwrap().unwrap())
+        let hit = first(&mut face, &from, &-Vec3::x(), 2.0).unwrap();
+        face.pressure(&hit)
     };
     let force = (0..count).map(ring).sum::<f64>() / f64::from(count) * std::f64::consts::PI * radius * radius;
     assert!((force / contact.force.norm() - 1.0).abs() < 1e-3, "{force} {}", contact.force.norm());
@@ -69,7 +77,7 @@ fn a_point_is_inside_where_the_field_says_so() {
             }
         }
         assert!(sight.inside(&Vec3::repeat(f64::NAN)).is_err());
-        let none = sight.without(bodies[0]).without(bodies[1]);
-        assert!(none.cast_ray(&Vec3::x(), &-Vec3::x(), 9.0).unwrap().is_none());
+        let mut none = sight.without(bodies[0]).without(bodies[1]);
+        assert!(first(&mut none, &Vec3::x(), &-Vec3::x(), 9.0).is_none());
     }
 }

@@ -9,7 +9,7 @@ use crate::coat::Coat;
 use crate::math::Vec3;
 
 /// A coat and what presses on it, with their skeletons in trees.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Prepared {
     deformed: Deformed,
     thinnest: f64,

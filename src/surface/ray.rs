@@ -44,7 +44,7 @@ pub fn enters(coat: &Coat, origin: &Vec3, direction: &Vec3, length: f64) -> bool
 }
 
 /// A coat's skeletons in a tree, for many rays against one coat; with the memory that rays use again.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Caster {
     tree: Tree,
     middle: Vec3,
@@ -244,7 +244,7 @@ impl Term {
 }
 
 /// Memory of a ray.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 struct Work {
     /// The skeletons whose fields the line meets, in the order of their entries.
     passages: Vec<Passage>,

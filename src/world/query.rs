@@ -6,6 +6,7 @@ use crate::coat::{Coat, seeds, territory};
 use crate::error::{Error, Result, out_of_range, require, require_finite};
 use crate::math::{Pose, Vec3};
 use crate::surface::deformed::Deformed;
+use crate::surface::prepared::Prepared;
 use crate::surface::{SurfaceHit, closest, ray};
 
 /// Where a ray meets a coat.
@@ -205,19 +206,27 @@ impl World {
         deformation: Deformation,
     ) -> Result<Option<RayHit>> {
         let ray = Ray { origin: *origin, direction: *direction, max_distance };
-        let hit_of = |body: usize, direction: &Vec3, length: f64| {
+        ray.check()?;
+        let direction = ray.unit_direction();
+        let mut first: Option<RayHit> = None;
+        for body in self.bodies_of(mask) {
             let posed = self.posed_coat(body);
             let local = posed.localise(origin);
             let hit = if deformation == Deformation::None {
-                ray::cast(&posed.coat, &local, direction, length)
-            } else if ray::enters(&posed.coat, &local, direction, length) {
-                self.deformed_coat(body, deformation).0.cast(&local, direction, length)
+                ray::cast(&posed.coat, &local, &direction, max_distance)
+            } else if ray::enters(&posed.coat, &local, &direction, max_distance) {
+                let mut target = Prepared::default();
+                target.prepare(self.deformed_coat(body, deformation).0);
+                target.cast(&local, &direction, max_distance)
             } else {
                 None
             };
-            Some(self.ray_hit(body, &posed.coat.origin, &posed.skeletons, hit?))
-        };
-        first_hit(&ray, self.bodies_of(mask), hit_of)
+            let Some(hit) = hit else { continue };
+            if first.is_none_or(|first| hit.distance < first.distance) {
+                first = Some(self.ray_hit(body, &posed.coat.origin, &posed.skeletons, hit));
+            }
+        }
+        Ok(first)
     }
 
     /// A hit of a body, whose coat is in a frame at `origin`, as the world has it.
@@ -301,29 +310,6 @@ impl World {
         territory::seeds(&posed.coat, index, &rays, &mut followed.seeds);
         Ok(followed)
     }
-}
-
-/// The first hit of a ray among bodies, in the order of their ids; `hit_of` casts it, with a unit direction.
-pub(super) fn first_hit<B>(
-    ray: &Ray,
-    bodies: impl Iterator<Item = B>,
-    hit_of: impl Fn(B, &Vec3, f64) -> Option<RayHit>,
-) -> Result<Option<RayHit>> {
-    ray.check()?;
-    let direction = ray.unit_direction();
-    let mut length = ray.max_distance;
-    let mut first = None;
-    for body in bodies {
-        let Some(hit) = hit_of(body, &direction, length) else { continue };
-        if first.is_none() || hit.distance < length {
-            length = hit.distance;
-            first = Some(hit);
-        }
-        if length == 0.0 {
-            break;
-        }
-    }
-    Ok(first)
 }
 
 /// The rays of a skeleton, followed to their ends.

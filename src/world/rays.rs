@@ -4,9 +4,6 @@ use super::query::RayHit;
 use super::{Deformation, World};
 use crate::error::{Error, Result, out_of_range, require, require_finite};
 use crate::math::Vec3;
-use crate::surface::SurfaceHit;
-use crate::surface::prepared::Prepared;
-use crate::surface::tree::Tree;
 
 /// A ray in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,13 +66,6 @@ impl Default for RaysDesc {
     }
 }
 
-/// A body that rays may meet.
-struct Aim {
-    body: usize,
-    target: Prepared,
-    skeletons: Vec<usize>,
-}
-
 impl World {
     /// What each of many rays meets, as [`World::cast_ray_deformed`] finds it: `tell` gets the number of each ray in
     /// turn, and its hit. The coats are placed, and sorted into trees, once for all rays, so that a ray looks only at the
@@ -93,49 +83,8 @@ impl World {
         for (index, ray) in rays.clone().enumerate() {
             ray.check().map_err(|error| (index, error))?;
         }
-        let mut aims: Vec<Aim> = self.bodies_of(desc.mask).map(|body| self.aim(body, desc.deformation)).collect();
-        let mut tree = Tree::default();
-        tree.build(aims.iter().map(|aim| {
-            let coat = &aim.target.deformed().coat;
-            let (low, high) = coat.bounds();
-            (low + coat.origin, high + coat.origin)
-        }));
-        let mut near: Vec<(f64, u32)> = Vec::new();
-        for (index, ray) in rays.enumerate() {
-            let direction = ray.unit_direction();
-            near.clear();
-            tree.meet(&ray.origin, &direction, ray.max_distance, |aim, at| near.push((at, aim)));
-            near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-            let mut first: Option<(u32, SurfaceHit)> = None;
-            for (at, aim) in &near {
-                let length = first.map_or(ray.max_distance, |(_, hit)| hit.distance);
-                if *at > length {
-                    break;
-                }
-                let target = &mut aims[*aim as usize].target;
-                let local = ray.origin - target.deformed().coat.origin;
-                let Some(hit) = target.cast(&local, &direction, length) else { continue };
-                // Of coats at the same distance, the first body wins.
-                if first.is_none_or(|(other, _)| hit.distance < length || *aim < other) {
-                    first = Some((*aim, hit));
-                }
-                if desc.goal == RayGoal::Any {
-                    break;
-                }
-            }
-            let hit_of = |(aim, hit): (u32, SurfaceHit)| {
-                let Aim { body, target, skeletons } = &aims[aim as usize];
-                self.ray_hit(*body, &target.deformed().coat.origin, skeletons, hit)
-            };
-            tell(index, first.map(hit_of));
-        }
+        let mut sight = self.sight(desc.mask, desc.deformation);
+        rays.enumerate().for_each(|(index, ray)| tell(index, sight.cast_checked(&ray, desc.goal)));
         Ok(())
-    }
-
-    fn aim(&self, body: usize, deformation: Deformation) -> Aim {
-        let (deformed, skeletons) = self.deformed_coat(body, deformation);
-        let mut target = Prepared::default();
-        target.prepare(deformed);
-        Aim { body, target, skeletons }
     }
 }

@@ -4,6 +4,7 @@ use isocoat::World;
 use isocoat::field::Shape;
 use isocoat::math::Vec3;
 use isocoat::world::query::RayHit;
+use isocoat::world::rays::{Ray, RayGoal};
 use isocoat::world::sight::{Inside, Sight};
 use rayon::prelude::*;
 
@@ -32,11 +33,14 @@ pub fn render(world: &World, view: &View) -> isocoat::Result<Picture> {
     let [width, height] = view.size;
     let rows: Vec<Vec<Colour>> = (0..height)
         .into_par_iter()
-        .map(|y| (0..width).map(|x| scene.look(f64::from(x) + 0.5, f64::from(y) + 0.5)).collect())
+        .map_init(
+            || scene.clone(),
+            |scene, y| (0..width).map(|x| scene.look(f64::from(x) + 0.5, f64::from(y) + 0.5)).collect(),
+        )
         .collect::<isocoat::Result<_>>()?;
     let refined: Vec<Vec<Colour>> = (0..height as usize)
         .into_par_iter()
-        .map(|y| (0..width as usize).map(|x| scene.refine(&rows, x, y)).collect())
+        .map_init(|| scene.clone(), |scene, y| (0..width as usize).map(|x| scene.refine(&rows, x, y)).collect())
         .collect::<isocoat::Result<_>>()?;
     Ok(Picture { size: view.size, pixels: refined.into_iter().flatten().map(bytes).collect() })
 }
@@ -49,6 +53,7 @@ fn bytes(colour: Colour) -> [u8; 3] {
     [rounded.x, rounded.y, rounded.z].map(|x| x.round() as u8)
 }
 
+#[derive(Clone)]
 struct Scene<'a> {
     world: &'a World,
     sight: Sight<'a>,
@@ -56,7 +61,7 @@ struct Scene<'a> {
 }
 
 impl Scene<'_> {
-    fn refine(&self, rows: &[Vec<Colour>], x: usize, y: usize) -> isocoat::Result<Colour> {
+    fn refine(&mut self, rows: &[Vec<Colour>], x: usize, y: usize) -> isocoat::Result<Colour> {
         let own = rows[y][x];
         let near = [(x.wrapping_sub(1), y), (x + 1, y), (x, y.wrapping_sub(1)), (x, y + 1)];
         let others = near.iter().filter_map(|(x, y)| rows.get(*y)?.get(*x));
@@ -73,7 +78,7 @@ impl Scene<'_> {
     }
 
     /// What is seen through a point of the picture.
-    fn look(&self, x: f64, y: f64) -> isocoat::Result<Colour> {
+    fn look(&mut self, x: f64, y: f64) -> isocoat::Result<Colour> {
         let direction = self.view.ray(x, y).normalize();
         let mut start = self.view.eye;
         if let Some(cut) = self.view.cut {
@@ -90,7 +95,8 @@ impl Scene<'_> {
                 }
             }
         }
-        match self.sight.cast_ray(&start, &direction, f64::INFINITY)? {
+        let ray = Ray { origin: start, direction, max_distance: f64::INFINITY };
+        match self.sight.cast_ray(&ray, RayGoal::Closest)? {
             Some(hit) => self.shade(&hit, &direction),
             None => Ok(sky(&direction)),
         }
@@ -118,12 +124,13 @@ impl Scene<'_> {
         Ok(base * if shell < 0.12 { 0.78 } else { 0.92 })
     }
 
-    fn shade(&self, hit: &RayHit, direction: &Vec3) -> isocoat::Result<Colour> {
+    fn shade(&mut self, hit: &RayHit, direction: &Vec3) -> isocoat::Result<Colour> {
         let lamp = Vec3::new(0.35, -0.5, 0.8).normalize();
         let normal = hit.normal;
         let facing = normal.dot(&lamp);
         let start = hit.position + normal * (0.6 * self.view.pixel(&hit.position));
-        let lit = facing > 0.0 && self.sight.cast_ray(&start, &lamp, f64::INFINITY)?.is_none();
+        let to_lamp = Ray { origin: start, direction: lamp, max_distance: f64::INFINITY };
+        let lit = facing > 0.0 && self.sight.cast_ray(&to_lamp, RayGoal::Any)?.is_none();
         let base = self.colour(hit);
         // Sky from above, a little from the ground, the lamp, and its mirror image.
         let ambient = 0.30 + 0.14 * normal.z;
