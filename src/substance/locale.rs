@@ -12,7 +12,7 @@
 use std::sync::atomic::{Ordering, compiler_fence};
 
 use super::swarm::{Matter, Swarm};
-use crate::field::lanes::Lanes;
+use crate::field::lanes::{Dispatch, Kernel, Lanes};
 use crate::math::Vec3;
 
 /// Fields are summed eight at a time, in eight sums: the same bits whatever registers there are.
@@ -86,66 +86,41 @@ impl Group {
         out.extend(self.blocks.iter().flat_map(|block| block.fields::<false>(p)[0].0));
     }
 
-    /// [`along`] with the widest registers of this processor.
+    /// Fields and slopes at points on rays from `center`, with the widest registers of this processor.
     fn along(&self, center: &Vec3, on: &mut OnRays) {
-        let count = self.indices.len();
-        #[cfg(target_arch = "x86_64")]
-        {
-            if is_x86_feature_detected!("avx512f") {
-                // SAFETY: the processor has it.
-                return unsafe { along_avx512(&self.blocks, count, center, on) };
-            }
-            if is_x86_feature_detected!("avx2") {
-                // SAFETY: the processor has it.
-                return unsafe { along_avx2(&self.blocks, count, center, on) };
-            }
-        }
-        along(&self.blocks, count, center, on);
+        Dispatch::best().run(Along { blocks: &self.blocks, count: self.indices.len(), center, on });
     }
 
     /// Sums of the columns of [`Block::fields`], with the widest registers of this processor.
     fn run<const GRADIENT: bool>(&self, p: &Vec3) -> [f64; 4] {
-        #[cfg(target_arch = "x86_64")]
-        {
-            if is_x86_feature_detected!("avx512f") {
-                // SAFETY: the processor has it.
-                return unsafe { run_avx512::<GRADIENT>(&self.blocks, p) };
-            }
-            if is_x86_feature_detected!("avx2") {
-                // SAFETY: the processor has it.
-                return unsafe { run_avx2::<GRADIENT>(&self.blocks, p) };
-            }
-        }
-        sums::<GRADIENT>(&self.blocks, p)
+        Dispatch::best().run(Sums::<GRADIENT> { blocks: &self.blocks, p })
     }
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn run_avx2<const GRADIENT: bool>(blocks: &[Block], p: &Vec3) -> [f64; 4] {
-    sums::<GRADIENT>(blocks, p)
+/// The arguments of [`Group::run`].
+struct Sums<'a, const GRADIENT: bool> {
+    blocks: &'a [Block],
+    p: &'a Vec3,
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f")]
-fn run_avx512<const GRADIENT: bool>(blocks: &[Block], p: &Vec3) -> [f64; 4] {
-    sums::<GRADIENT>(blocks, p)
-}
+impl<const GRADIENT: bool> Kernel for Sums<'_, GRADIENT> {
+    type Output = [f64; 4];
 
-#[inline(always)]
-fn sums<const GRADIENT: bool>(blocks: &[Block], p: &Vec3) -> [f64; 4] {
-    // Written out: what is not inlined here would not use the wide registers.
-    let (mut value, mut x, mut y, mut z) = (ZERO, ZERO, ZERO, ZERO);
-    for block in blocks {
-        // No cost at run time: keeps the compiler from spreading vectors over several blocks, as in `field::lanes`.
-        compiler_fence(Ordering::SeqCst);
-        let [field, gx, gy, gz] = block.fields::<GRADIENT>(p);
-        value = value + field;
-        if GRADIENT {
-            (x, y, z) = (x + gx, y + gy, z + gz);
+    #[inline(always)]
+    fn run<const W: usize>(self) -> [f64; 4] {
+        // Written out: what is not inlined here would not use the wide registers.
+        let (mut value, mut x, mut y, mut z) = (ZERO, ZERO, ZERO, ZERO);
+        for block in self.blocks {
+            // No cost at run time: keeps the compiler from spreading vectors over several blocks, as in `field::lanes`.
+            compiler_fence(Ordering::SeqCst);
+            let [field, gx, gy, gz] = block.fields::<GRADIENT>(self.p);
+            value = value + field;
+            if GRADIENT {
+                (x, y, z) = (x + gx, y + gy, z + gz);
+            }
         }
+        [value.sum(), x.sum(), y.sum(), z.sum()]
     }
-    [value.sum(), x.sum(), y.sum(), z.sum()]
 }
 
 impl Block {
@@ -223,17 +198,28 @@ impl OnRays {
     }
 }
 
-/// Fields and slopes at points on rays from `center`.
-#[inline(always)]
-fn along(blocks: &[Block], count: usize, center: &Vec3, on: &mut OnRays) {
-    let OnRays { u: [x, y, z], r, value, slope } = on;
-    value.fill(0.0);
-    slope.fill(0.0);
-    for k in 0..count {
-        let (block, lane) = (&blocks[k / WIDTH], k % WIDTH);
-        let from = [0, 1, 2].map(|axis| center[axis] - block.place[axis].0[lane]);
-        let sizes = (block.radius.0[lane], block.inverse_width.0[lane], block.isovalue.0[lane]);
-        along_one(x, y, z, r, from, sizes, value, slope);
+/// The arguments of [`Group::along`].
+struct Along<'a> {
+    blocks: &'a [Block],
+    count: usize,
+    center: &'a Vec3,
+    on: &'a mut OnRays,
+}
+
+impl Kernel for Along<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<const W: usize>(self) {
+        let OnRays { u: [x, y, z], r, value, slope } = self.on;
+        value.fill(0.0);
+        slope.fill(0.0);
+        for k in 0..self.count {
+            let (block, lane) = (&self.blocks[k / WIDTH], k % WIDTH);
+            let from = [0, 1, 2].map(|axis| self.center[axis] - block.place[axis].0[lane]);
+            let sizes = (block.radius.0[lane], block.inverse_width.0[lane], block.isovalue.0[lane]);
+            along_one(x, y, z, r, from, sizes, value, slope);
+        }
     }
 }
 
@@ -262,18 +248,6 @@ fn along_one(
         value[at] += isovalue * own;
         slope[at] -= steep * steepness * along / if distance > 1e-150 { distance } else { 1e-150 };
     }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn along_avx2(blocks: &[Block], count: usize, center: &Vec3, on: &mut OnRays) {
-    along(blocks, count, center, on);
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f")]
-fn along_avx512(blocks: &[Block], count: usize, center: &Vec3, on: &mut OnRays) {
-    along(blocks, count, center, on);
 }
 
 /// The field round one particle.

@@ -11,6 +11,7 @@ use std::f64::consts::PI;
 use super::locale::{Locale, OnRays};
 use super::swarm::Swarm;
 use crate::coat::volume::OFFSETS;
+use crate::field::lanes::{Dispatch, Kernel};
 use crate::math::Vec3;
 
 /// Longest way of an offset in one step, as a fraction of the thickness.
@@ -102,26 +103,27 @@ impl Borders {
     /// Looks at these rivals too, the first of which has this number, with the widest registers of this processor; the same
     /// bits with any.
     fn meet(&mut self, rays: &Rays, rivals: &[Rival], number: usize) {
-        #[cfg(target_arch = "x86_64")]
-        {
-            if is_x86_feature_detected!("avx512f") {
-                // SAFETY: the processor has it.
-                return unsafe { meet_avx512(rays, rivals, number, self) };
-            }
-            if is_x86_feature_detected!("avx2") {
-                // SAFETY: the processor has it.
-                return unsafe { meet_avx2(rays, rivals, number, self) };
-            }
-        }
-        meet(rays, rivals, number, self);
+        Dispatch::best().run(Meet { rays, rivals, number, borders: self });
     }
 }
 
-#[inline(always)]
-fn meet(rays: &Rays, rivals: &[Rival], number: usize, borders: &mut Borders) {
-    let ([x, y, z], Borders { first, slope, rival: nearest }) = (&rays.u, borders);
-    for (at, rival) in rivals.iter().enumerate() {
-        meet_one(x, y, z, rival, (number + at) as f64, first, slope, nearest);
+/// The arguments of [`Borders::meet`].
+struct Meet<'a> {
+    rays: &'a Rays,
+    rivals: &'a [Rival],
+    number: usize,
+    borders: &'a mut Borders,
+}
+
+impl Kernel for Meet<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<const W: usize>(self) {
+        let ([x, y, z], Borders { first, slope, rival: nearest }) = (&self.rays.u, self.borders);
+        for (at, rival) in self.rivals.iter().enumerate() {
+            meet_one(x, y, z, rival, (self.number + at) as f64, first, slope, nearest);
+        }
     }
 }
 
@@ -150,18 +152,6 @@ fn meet_one(
         slope[ray] = if is_nearer { ahead } else { slope[ray] };
         nearest[ray] = if is_nearer { number } else { nearest[ray] };
     }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn meet_avx2(rays: &Rays, rivals: &[Rival], number: usize, borders: &mut Borders) {
-    meet(rays, rivals, number, borders);
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f")]
-fn meet_avx512(rays: &Rays, rivals: &[Rival], number: usize, borders: &mut Borders) {
-    meet(rays, rivals, number, borders);
 }
 
 /// A ray that does not end at a border close by.

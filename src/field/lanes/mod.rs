@@ -10,19 +10,22 @@
 //!   instruction when `W` is the register's width;
 //! - `Distance` and `Falloff`: shapes and profiles without branches, the constants of a skeleton worked out once for
 //!   many points;
-//! - `Query` and [`Dispatch`]: the loops, compiled once for each instruction set, and the choice among them.
+//! - `Query` and [`Dispatch`]: the loops as a `Kernel`, compiled once for each instruction set, and the choice among them.
 //!
 //! The scalar twin, and the reference in the tests, is [`blend::value_gradient`](super::blend::value_gradient): it
 //! agrees to round-off, not in its bits, because divisions by a skeleton's constants are multiplications here.
 
 use std::sync::atomic::{Ordering, compiler_fence};
 
+mod dispatch;
 mod distance;
 mod falloff;
 mod spans;
 mod vector;
 
 use super::{Placed, Shape};
+pub use dispatch::Dispatch;
+pub(crate) use dispatch::Kernel;
 use distance::{Away, Distance, ToBox, ToPlane, ToPoint, ToSegment, ToTriangle};
 use falloff::Falloff;
 pub use spans::{Cubes, Spans, spans};
@@ -68,104 +71,6 @@ pub fn evaluate_some(
     Dispatch::best().run(Query { skeletons, some: Some(some), points, values, gradients });
 }
 
-/// An instruction set that this processor has: a value of this type is the proof that it does.
-///
-/// All give the same bits. To choose one is for tests and benchmarks; [`evaluate`] takes the widest.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Dispatch(InstructionSet);
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum InstructionSet {
-    /// What the crate is compiled for.
-    Baseline,
-    #[cfg(target_arch = "x86_64")]
-    Avx2,
-    #[cfg(target_arch = "x86_64")]
-    Avx512,
-}
-
-impl Dispatch {
-    /// The widest instruction set of this processor.
-    pub fn best() -> Self {
-        #[cfg(target_arch = "x86_64")]
-        {
-            if is_x86_feature_detected!("avx512f") {
-                return Self(InstructionSet::Avx512);
-            }
-            if is_x86_feature_detected!("avx2") {
-                return Self(InstructionSet::Avx2);
-            }
-        }
-        Self(InstructionSet::Baseline)
-    }
-
-    /// Every instruction set of this processor, from the narrowest to [`Dispatch::best`].
-    pub fn available() -> impl Iterator<Item = Self> {
-        let baseline = std::iter::once(InstructionSet::Baseline);
-        #[cfg(target_arch = "x86_64")]
-        let wider = [
-            is_x86_feature_detected!("avx2").then_some(InstructionSet::Avx2),
-            is_x86_feature_detected!("avx512f").then_some(InstructionSet::Avx512),
-        ];
-        #[cfg(not(target_arch = "x86_64"))]
-        let wider: [Option<InstructionSet>; 0] = [];
-        baseline.chain(wider.into_iter().flatten()).map(Self)
-    }
-
-    /// "baseline", "avx2" or "avx512".
-    pub fn name(self) -> &'static str {
-        match self.0 {
-            InstructionSet::Baseline => "baseline",
-            #[cfg(target_arch = "x86_64")]
-            InstructionSet::Avx2 => "avx2",
-            #[cfg(target_arch = "x86_64")]
-            InstructionSet::Avx512 => "avx512",
-        }
-    }
-
-    /// [`evaluate`] with this instruction set.
-    ///
-    /// # Panics
-    ///
-    /// When `values` or `gradients` is not as long as `points`.
-    pub fn evaluate(
-        self,
-        skeletons: &[Placed],
-        points: &[[f64; 3]],
-        values: Option<&mut [f64]>,
-        gradients: Option<&mut [[f64; 3]]>,
-    ) {
-        self.run(Query { skeletons, some: None, points, values, gradients });
-    }
-
-    fn run(self, query: Query) {
-        match self.0 {
-            InstructionSet::Baseline => query.run::<BASELINE_WIDTH>(),
-            #[cfg(target_arch = "x86_64")]
-            // SAFETY: `best` and `available` alone make this variant, after they have seen that the processor has AVX2.
-            InstructionSet::Avx2 => unsafe { run_avx2(query) },
-            #[cfg(target_arch = "x86_64")]
-            // SAFETY: as above, with AVX-512F.
-            InstructionSet::Avx512 => unsafe { run_avx512(query) },
-        }
-    }
-}
-
-/// Two numbers a register: SSE2 and NEON.
-const BASELINE_WIDTH: usize = 2;
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn run_avx2(query: Query) {
-    query.run::<4>();
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f")]
-fn run_avx512(query: Query) {
-    query.run::<8>();
-}
-
 /// The arguments of [`evaluate`] and [`evaluate_some`].
 struct Query<'a> {
     skeletons: &'a [Placed],
@@ -177,7 +82,9 @@ struct Query<'a> {
 
 // Everything from here on is `inline(always)`: it must be compiled inside the function that enables the instructions.
 
-impl Query<'_> {
+impl Kernel for Query<'_> {
+    type Output = ();
+
     #[inline(always)]
     fn run<const W: usize>(self) {
         let Query { skeletons, some, points, mut values, mut gradients } = self;

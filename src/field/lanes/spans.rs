@@ -3,7 +3,7 @@
 use super::distance::{Distance, ToBox, ToPlane, ToPoint, ToSegment, ToTriangle};
 use super::falloff::Falloff;
 use super::vector::Lanes;
-use super::{BASELINE_WIDTH, Dispatch, InstructionSet};
+use super::{Dispatch, Kernel};
 use crate::field::{Placed, Shape};
 
 /// Eight cubes with the frame's axes, and a smaller one in the middle of each.
@@ -49,28 +49,7 @@ impl Spans {
 /// When a position is none.
 pub fn spans(skeletons: &[Placed], some: &[u32], cubes: &Cubes, out: &mut Spans) {
     out.reach.clear();
-    let search = Search { skeletons, some, cubes, out };
-    match Dispatch::best().0 {
-        InstructionSet::Baseline => search.run::<BASELINE_WIDTH>(),
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: `best` makes this variant only when the processor has AVX2.
-        InstructionSet::Avx2 => unsafe { spans_avx2(search) },
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: as above, with AVX-512F.
-        InstructionSet::Avx512 => unsafe { spans_avx512(search) },
-    }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn spans_avx2(search: Search) {
-    search.run::<4>();
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f")]
-fn spans_avx512(search: Search) {
-    search.run::<8>();
+    Dispatch::best().run(Search { skeletons, some, cubes, out });
 }
 
 /// The arguments of [`spans`].
@@ -81,7 +60,9 @@ struct Search<'a> {
     out: &'a mut Spans,
 }
 
-impl Search<'_> {
+impl Kernel for Search<'_> {
+    type Output = ();
+
     #[inline(always)]
     fn run<const W: usize>(self) {
         let Search { skeletons, some, cubes, out } = self;
