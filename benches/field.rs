@@ -3,6 +3,9 @@
 //! An item is one point against one skeleton. `scalar` is a loop over single points; `lanes` is the bulk evaluation,
 //! once for each instruction set of this processor.
 
+mod common;
+
+use common::numbers;
 use divan::{Bencher, black_box, counter::ItemsCount};
 use isocoat::field::lanes::Dispatch;
 use isocoat::field::{Graph, Placed, Profile, Shape, blend};
@@ -15,15 +18,6 @@ fn main() {
 const POINTS: usize = 1024;
 const SKELETONS: usize = 64;
 const SHAPES: [&str; 5] = ["point", "segment", "triangle", "box", "plane"];
-
-/// Numbers between -1 and 1, the same in every run (a Weyl sequence).
-fn numbers() -> impl FnMut() -> f64 {
-    let mut state = 0.5_f64;
-    move || {
-        state = (state + 0.618_033_988_749_894_9).fract();
-        2.0 * state - 1.0
-    }
-}
 
 /// Skeletons of one kind and points among them: some inside, some in the falloff, some out of reach.
 fn scene(shape: &str) -> (Vec<Placed>, Vec<[f64; 3]>) {

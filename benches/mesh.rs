@@ -1,5 +1,8 @@
 //! Speed of watertight meshes, one thread. An item is a triangle, with its share of vertices and normals.
 
+mod common;
+
+use common::numbers;
 use divan::{Bencher, counter::ItemsCount};
 use isocoat::coat::Coat;
 use isocoat::field::{Placed, Profile, Shape};
@@ -10,15 +13,6 @@ use isocoat::surface::mesh::{Mesh, Workspace, mesh};
 
 fn main() {
     divan::main();
-}
-
-/// Numbers between -1 and 1, the same in every run (a Weyl sequence).
-fn numbers() -> impl FnMut() -> f64 {
-    let mut state = 0.5_f64;
-    move || {
-        state = (state + 0.618_033_988_749_894_9).fract();
-        2.0 * state - 1.0
-    }
 }
 
 /// A coat whose surface is at `thickness`, and its fields end at twice that.

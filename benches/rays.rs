@@ -1,5 +1,8 @@
 //! Speed of many rays in one call, one thread. An item is a ray.
 
+mod common;
+
+use common::numbers;
 use divan::{Bencher, counter::ItemsCount};
 use isocoat::World;
 use isocoat::field::Shape;
@@ -9,15 +12,6 @@ use isocoat::world::{BodyDesc, Deformation, LinkDesc, SkeletonDesc, WorldDesc};
 
 fn main() {
     divan::main();
-}
-
-/// Numbers between -1 and 1, the same in every run (a Weyl sequence).
-fn numbers() -> impl FnMut() -> f64 {
-    let mut state = 0.5_f64;
-    move || {
-        state = (state + 0.618_033_988_749_894_9).fract();
-        2.0 * state - 1.0
-    }
 }
 
 /// A blob of shapes in a cube of two metres that overlap, as in the bench of meshes.

@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::Random;
+use common::{Coat, Random};
 use isocoat::World;
 use isocoat::field::Shape;
 use isocoat::math::{Pose, Vec3, tangents};
@@ -22,12 +22,7 @@ fn hard() -> BodyDesc {
 }
 
 fn add(world: &mut World, desc: BodyDesc, shapes: &[Shape], pose: Pose) -> BodyId {
-    let body = world.create_body(desc).unwrap();
-    let link = world.create_link(body, LinkDesc { pose, ..LinkDesc::default() }).unwrap();
-    for shape in shapes {
-        world.create_skeleton(link, SkeletonDesc { shape: *shape, thickness: T, ..SkeletonDesc::default() }).unwrap();
-    }
-    body
+    Coat::new(shapes, T).add(world, desc, LinkDesc { pose, ..LinkDesc::default() }).0
 }
 
 fn ball(world: &mut World, desc: BodyDesc, center: Vec3) -> BodyId {

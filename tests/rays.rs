@@ -2,13 +2,13 @@
 
 mod common;
 
-use common::Random;
+use common::{Coat, Random};
 use isocoat::World;
 use isocoat::field::Shape;
 use isocoat::math::{Mat3, Pose, Vec3};
 use isocoat::world::query::RayHit;
 use isocoat::world::rays::{Ray, RayGoal, RaysDesc};
-use isocoat::world::{BodyDesc, BodyId, Deformation, LinkDesc, SkeletonDesc, WorldDesc};
+use isocoat::world::{BodyDesc, BodyId, Deformation, LinkDesc, WorldDesc};
 
 const DEFORMATIONS: [Deformation; 3] = [Deformation::None, Deformation::Contact, Deformation::Bulges];
 const T: f64 = 0.1;
@@ -18,12 +18,7 @@ fn world() -> World {
 }
 
 fn add(world: &mut World, desc: BodyDesc, shapes: &[Shape], pose: Pose) -> BodyId {
-    let body = world.create_body(desc).unwrap();
-    let link = world.create_link(body, LinkDesc { pose, ..LinkDesc::default() }).unwrap();
-    for shape in shapes {
-        world.create_skeleton(link, SkeletonDesc { shape: *shape, thickness: T, ..SkeletonDesc::default() }).unwrap();
-    }
-    body
+    Coat::new(shapes, T).add(world, desc, LinkDesc { pose, ..LinkDesc::default() }).0
 }
 
 fn place(random: &mut Random, size: f64) -> Vec3 {

@@ -127,16 +127,21 @@ pub(super) fn cone(axis: &Vec3) -> impl Iterator<Item = Vec3> {
 
 /// Where a ray from the inside leaves the solid; `None` if it does not.
 fn exit(coat: &Coat, p: &Vec3, direction: &Vec3) -> Option<Vec3> {
-    let mut stride = coat.skeletons.iter().map(|k| 0.25 * k.profile.thickness).fold(f64::INFINITY, f64::min);
-    let excess = |s: f64| coat.excess(&(p + direction * s));
+    let stride = coat.skeletons.iter().map(|k| 0.25 * k.profile.thickness).fold(f64::INFINITY, f64::min);
+    first_exit(|s| coat.excess(&(p + direction * s)), stride, 1.25, 100).map(|s| p + direction * s)
+}
+
+/// Where an excess that is not negative at 0 first becomes so, looked for in so many strides, each longer than the one
+/// before by a factor.
+pub(super) fn first_exit(excess: impl Fn(f64) -> f64, mut stride: f64, growth: f64, strides: usize) -> Option<f64> {
     let (mut s, mut here) = (0.0, excess(0.0));
-    for _ in 0..100 {
+    for _ in 0..strides {
         let ahead = excess(s + stride);
         if ahead < 0.0 {
-            return Some(p + direction * bracketed(s, s + stride, here, ahead, excess));
+            return Some(bracketed(s, s + stride, here, ahead, excess));
         }
         (s, here) = (s + stride, ahead);
-        stride *= 1.25;
+        stride *= growth;
     }
     None
 }

@@ -14,7 +14,8 @@
 //! the highest pressure; bulges add up, as far as the room that each obstacle leaves.
 
 use super::SurfaceHit;
-use super::{closest, ray};
+use super::closest::{self, first_exit};
+use super::ray;
 use crate::coat::Coat;
 use crate::coat::root::bracketed;
 use crate::field::{Shape, blend};
@@ -305,18 +306,7 @@ impl Deformed {
     /// Where a ray from the inside leaves the deformed solid.
     fn exit(&self, p: &Vec3, direction: &Vec3) -> Option<Vec3> {
         let thinnest = self.coat.skeletons.iter().map(|k| k.profile.thickness).fold(f64::INFINITY, f64::min);
-        let mut stride = 0.0625 * thinnest;
-        let excess = |s: f64| self.excess(&(p + direction * s));
-        let (mut s, mut here) = (0.0, excess(0.0));
-        for _ in 0..200 {
-            let ahead = excess(s + stride);
-            if ahead < 0.0 {
-                return Some(p + direction * bracketed(s, s + stride, here, ahead, excess));
-            }
-            (s, here) = (s + stride, ahead);
-            stride *= 1.1;
-        }
-        None
+        first_exit(|s| self.excess(&(p + direction * s)), 0.0625 * thinnest, 1.1, 200).map(|s| p + direction * s)
     }
 
     /// Slides from `x`, on the surface, to a local minimum of the distance to `p`: Newton's steps in the tangent plane,

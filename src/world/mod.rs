@@ -91,6 +91,25 @@ pub struct Link {
     pub(crate) mirror: Mirror,
 }
 
+impl Link {
+    /// One that nothing has happened to yet.
+    pub(crate) fn new(desc: LinkDesc, body: u32) -> Self {
+        Link {
+            desc,
+            body,
+            skeletons: Vec::new(),
+            enabled: true,
+            applied_force: Wrench::default(),
+            applied_impulse: Wrench::default(),
+            contact_impulse: Wrench::default(),
+            host_impulse: Wrench::default(),
+            substance_impulse: Wrench::default(),
+            last_dt: 0.0,
+            mirror: Mirror::default(),
+        }
+    }
+}
+
 /// A skeleton as the world keeps it.
 pub struct Skeleton {
     pub(crate) desc: SkeletonDesc,
@@ -323,19 +342,7 @@ impl World {
             return Err(Error::Unsupported("a substance has particles in place of links"));
         }
         desc.pose.rotation.renormalize();
-        let id = self.links.insert(Link {
-            desc,
-            body: body.raw.index,
-            skeletons: Vec::new(),
-            enabled: true,
-            applied_force: Wrench::default(),
-            applied_impulse: Wrench::default(),
-            contact_impulse: Wrench::default(),
-            host_impulse: Wrench::default(),
-            substance_impulse: Wrench::default(),
-            last_dt: 0.0,
-            mirror: Mirror::default(),
-        })?;
+        let id = self.links.insert(Link::new(desc, body.raw.index))?;
         self.bodies.get_mut(body)?.links.push(id.raw.index);
         self.refresh(body.index());
         Ok(id)

@@ -3,8 +3,7 @@
 
 use crate::error::{Error, Result};
 use crate::handle::{Arena, Noun};
-use crate::math::{Pose, Twist, Vec3, Wrench};
-use crate::response::mirror::Mirror;
+use crate::math::{Pose, Twist, Vec3};
 use crate::substance::{Particle, Substance};
 use crate::world::blend::{Blending, Pairing};
 use crate::world::bytes::{Lasting, Reader, Sink};
@@ -72,27 +71,16 @@ fn substance_structure(substance: &Substance) -> Substance {
 
 impl Structural for Link {
     fn structure(&self) -> Self {
-        Link {
-            desc: LinkDesc {
-                pose: Pose::default(),
-                twist: Twist::default(),
-                external_acceleration: Vec3::zeros(),
-                external_angular_acceleration: Vec3::zeros(),
-                constrained: false,
-                inverse_effective_inertia: None,
-                ..self.desc.clone()
-            },
-            body: self.body,
-            skeletons: self.skeletons.clone(),
-            enabled: self.enabled,
-            applied_force: Wrench::default(),
-            applied_impulse: Wrench::default(),
-            contact_impulse: Wrench::default(),
-            host_impulse: Wrench::default(),
-            substance_impulse: Wrench::default(),
-            last_dt: 0.0,
-            mirror: Mirror::default(),
-        }
+        let desc = LinkDesc {
+            pose: Pose::default(),
+            twist: Twist::default(),
+            external_acceleration: Vec3::zeros(),
+            external_angular_acceleration: Vec3::zeros(),
+            constrained: false,
+            inverse_effective_inertia: None,
+            ..self.desc.clone()
+        };
+        Link { skeletons: self.skeletons.clone(), enabled: self.enabled, ..Link::new(desc, self.body) }
     }
 }
 
