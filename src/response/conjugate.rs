@@ -4,9 +4,10 @@
 //! count; what remains goes with the longest way through the island. Written after Chronopoulos and Gear (1989): both sums
 //! of an iteration are made at once, so that workers wait for each other twice in it, and not three times.
 
-use nalgebra::{Matrix6, Vector6};
+use nalgebra::Matrix6;
 
 use super::envelope::BLOCK;
+use crate::field::lanes::{Dispatch, Kernel};
 use crate::team::Team;
 
 /// The system: each row of blocks has the one on the diagonal, and its couplings on both sides of it.
@@ -16,29 +17,125 @@ pub struct Blocks {
     starts: Vec<u32>,
     /// The other row of each coupling.
     others: Vec<u32>,
-    entries: Vec<Matrix6<f64>>,
+    entries: Vec<Block>,
     rows: Vec<Row>,
     /// What is left of each row, preconditioned: the rows' own, for all to read.
-    eased: Vec<Vector6<f64>>,
+    eased: Vec<Column>,
     /// Two sums over some rows each.
     sums: Vec<[f64; 2]>,
+}
+
+/// Six numbers, and two zeros that fill the register.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(align(64))]
+struct Column([f64; 8]);
+
+impl Column {
+    fn of(x: &[f64]) -> Self {
+        let mut column = Self::default();
+        column.0[..BLOCK].copy_from_slice(x);
+        column
+    }
+
+    #[inline(always)]
+    fn dot(&self, other: &Self) -> f64 {
+        let products: [f64; 8] = std::array::from_fn(|lane| self.0[lane] * other.0[lane]);
+        let halves: [f64; 4] = std::array::from_fn(|lane| products[lane] + products[lane + 4]);
+        (halves[0] + halves[2]) + (halves[1] + halves[3])
+    }
+
+    #[inline(always)]
+    fn add_scaled(&mut self, other: &Self, factor: f64) {
+        for (x, other) in self.0.iter_mut().zip(&other.0) {
+            *x += other * factor;
+        }
+    }
+}
+
+/// A block of the matrix, by columns.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Block([Column; BLOCK]);
+
+impl Block {
+    /// The same numbers.
+    pub fn of(matrix: &Matrix6<f64>) -> Self {
+        Self(std::array::from_fn(|column| Column::of(matrix.column(column).as_slice())))
+    }
+
+    /// The inverse of a symmetric positive definite matrix, by its Cholesky factor; `None` when it is not one.
+    fn inverse_of(matrix: &Matrix6<f64>) -> Option<Self> {
+        // The factor's inverse, below the diagonal, row by row.
+        let mut factor = [[0.0; BLOCK]; BLOCK];
+        let mut inverse = [[0.0; BLOCK]; BLOCK];
+        for i in 0..BLOCK {
+            for j in 0..i {
+                let sum: f64 = (0..j).map(|k| factor[i][k] * factor[j][k]).sum();
+                factor[i][j] = (matrix[(i, j)] - sum) * inverse[j][j];
+            }
+            let pivot = matrix[(i, i)] - factor[i][..i].iter().map(|x| x * x).sum::<f64>();
+            if pivot.is_nan() || pivot <= 0.0 {
+                return None;
+            }
+            inverse[i][i] = 1.0 / pivot.sqrt();
+            for j in 0..i {
+                let sum: f64 = (j..i).map(|k| factor[i][k] * inverse[k][j]).sum();
+                inverse[i][j] = -sum * inverse[i][i];
+            }
+        }
+        let mut block = Self::default();
+        for i in 0..BLOCK {
+            for j in 0..=i {
+                let entry: f64 = (i..BLOCK).map(|k| inverse[k][i] * inverse[k][j]).sum();
+                block.0[j].0[i] = entry;
+                block.0[i].0[j] = entry;
+            }
+        }
+        Some(block)
+    }
+
+    /// Adds the product with `x`, in two strands that do not wait for each other.
+    #[inline(always)]
+    fn add_product(&self, x: &Column, strands: &mut [Column; 2]) {
+        for (columns, x) in self.0.chunks_exact(2).zip(x.0.chunks_exact(2)) {
+            strands[0].add_scaled(&columns[0], x[0]);
+            strands[1].add_scaled(&columns[1], x[1]);
+        }
+    }
+
+    #[inline(always)]
+    fn product(&self, x: &Column) -> Column {
+        let mut strands = [Column::default(); 2];
+        self.add_product(x, &mut strands);
+        joined(strands)
+    }
+}
+
+#[inline(always)]
+fn joined([mut sum, other]: [Column; 2]) -> Column {
+    sum.add_scaled(&other, 1.0);
+    sum
 }
 
 /// What the iteration keeps of a row of blocks.
 #[derive(Clone, Copy, Debug, Default)]
 struct Row {
-    inverse: Matrix6<f64>,
-    x: Vector6<f64>,
-    residual: Vector6<f64>,
-    eased: Vector6<f64>,
-    direction: Vector6<f64>,
+    diagonal: Block,
+    inverse: Block,
+    x: Column,
+    residual: Column,
+    /// What is left, preconditioned.
+    eased: Column,
+    direction: Column,
     /// The matrix times what is left, and times the direction.
-    image: Vector6<f64>,
-    direction_image: Vector6<f64>,
+    image: Column,
+    direction_image: Column,
 }
 
 /// Rows whose part of a sum is made by one worker: always as many, so that sums do not depend on who makes them.
 const ROWS: usize = 16;
+
+/// Blocks from which on two workers are quicker than one, who waits for nobody twice in each iteration.
+const WORTH_SHARING: usize = 3000;
 
 impl Blocks {
     /// No rows.
@@ -59,8 +156,8 @@ impl Blocks {
     }
 
     /// The blocks of all couplings, in the order in which they were made.
-    pub fn entries(&mut self) -> &mut [Matrix6<f64>] {
-        self.entries.resize(self.others.len(), Matrix6::zeros());
+    pub fn entries(&mut self) -> &mut [Block] {
+        self.entries.resize(self.others.len(), Block::default());
         &mut self.entries
     }
 
@@ -77,37 +174,28 @@ impl Blocks {
     ) -> bool {
         let Self { starts, others, entries, rows, eased, sums } = self;
         let count = diagonal.len();
+        let (alone, few) = (Team::alone(), entries.len() + count < WORTH_SHARING);
+        let team = if few { &alone } else { team };
         rows.resize(count, Row::default());
-        eased.resize(count, Vector6::zeros());
+        eased.resize(count, Column::default());
         sums.resize(count.div_ceil(ROWS), [0.0; 2]);
         let right = &*x;
         team.each_row(rows, 1, eased, |index, row| {
-            let residual = Vector6::from_column_slice(&right[index * BLOCK..][..BLOCK]);
-            let inverse = if fresh {
-                let factor = diagonal[index].cholesky();
-                factor.map_or_else(|| Matrix6::from_element(f64::NAN), |factor| factor.inverse())
-            } else {
-                row[0].inverse
-            };
-            let eased = inverse * residual;
-            row[0] = Row { inverse, residual, eased, ..Row::default() };
+            let row = &mut row[0];
+            if fresh {
+                let none = || Block::of(&Matrix6::from_element(f64::NAN));
+                row.inverse = Block::inverse_of(&diagonal[index]).unwrap_or_else(none);
+                row.diagonal = Block::of(&diagonal[index]);
+            }
+            let residual = Column::of(&right[index * BLOCK..][..BLOCK]);
+            let eased = row.inverse.product(&residual);
+            *row = Row { diagonal: row.diagonal, inverse: row.inverse, residual, eased, ..Row::default() };
             eased
         });
         let (mut first_size, mut last_size, mut part) = (0.0, f64::INFINITY, f64::INFINITY);
         for iteration in 0..=most {
             team.each_row(rows, ROWS, sums, |first, rows| {
-                let mut sums = [0.0; 2];
-                for (index, row) in rows.iter_mut().enumerate() {
-                    let index = first * ROWS + index;
-                    row.image = diagonal[index] * eased[index];
-                    let range = starts[index] as usize..starts[index + 1] as usize;
-                    for (entry, other) in entries[range.clone()].iter().zip(&others[range]) {
-                        row.image += entry * eased[*other as usize];
-                    }
-                    sums[0] += row.residual.dot(&eased[index]);
-                    sums[1] += row.image.dot(&eased[index]);
-                }
-                sums
+                Dispatch::best().run(Images { first: first * ROWS, rows, starts, others, entries, eased })
             });
             let size = sums.iter().map(|sums| sums[0]).sum::<f64>();
             if size.is_nan() {
@@ -123,20 +211,70 @@ impl Blocks {
             }
             part = size / bend;
             last_size = size;
-            team.each_row(rows, 1, eased, |_, row| {
-                let row = &mut row[0];
-                row.direction = row.eased + row.direction * turn;
-                row.direction_image = row.image + row.direction_image * turn;
-                row.x += row.direction * part;
-                row.residual -= row.direction_image * part;
-                row.eased = row.inverse * row.residual;
-                row.eased
-            });
+            team.each_row(rows, 1, eased, |_, row| Dispatch::best().run(Advance { row: &mut row[0], turn, part }));
         }
         for (x, row) in x.chunks_exact_mut(BLOCK).zip(rows.iter()) {
-            x.copy_from_slice(row.x.as_slice());
+            x.copy_from_slice(&row.x.0[..BLOCK]);
         }
         true
+    }
+}
+
+/// The matrix times what is left of some rows, and two sums: of what is left, and of its image, times what is left
+/// preconditioned.
+struct Images<'a> {
+    first: usize,
+    rows: &'a mut [Row],
+    starts: &'a [u32],
+    others: &'a [u32],
+    entries: &'a [Block],
+    eased: &'a [Column],
+}
+
+impl Kernel for Images<'_> {
+    type Output = [f64; 2];
+
+    #[inline(always)]
+    fn run<const W: usize>(self) -> [f64; 2] {
+        let Self { first, rows, starts, others, entries, eased } = self;
+        let mut sums = [0.0; 2];
+        for (index, row) in rows.iter_mut().enumerate() {
+            let index = first + index;
+            let mut strands = [Column::default(); 2];
+            row.diagonal.add_product(&eased[index], &mut strands);
+            let range = starts[index] as usize..starts[index + 1] as usize;
+            for (entry, other) in entries[range.clone()].iter().zip(&others[range]) {
+                entry.add_product(&eased[*other as usize], &mut strands);
+            }
+            row.image = joined(strands);
+            sums[0] += row.residual.dot(&eased[index]);
+            sums[1] += row.image.dot(&eased[index]);
+        }
+        sums
+    }
+}
+
+/// A step of a row along the new direction; gives what is left then, preconditioned.
+struct Advance<'a> {
+    row: &'a mut Row,
+    turn: f64,
+    part: f64,
+}
+
+impl Kernel for Advance<'_> {
+    type Output = Column;
+
+    #[inline(always)]
+    fn run<const W: usize>(self) -> Column {
+        let Self { row, turn, part } = self;
+        for lane in 0..row.x.0.len() {
+            row.direction.0[lane] = row.eased.0[lane] + row.direction.0[lane] * turn;
+            row.direction_image.0[lane] = row.image.0[lane] + row.direction_image.0[lane] * turn;
+            row.x.0[lane] += row.direction.0[lane] * part;
+            row.residual.0[lane] -= row.direction_image.0[lane] * part;
+        }
+        row.eased = row.inverse.product(&row.residual);
+        row.eased
     }
 }
 
@@ -144,6 +282,24 @@ impl Blocks {
 mod tests {
     use super::*;
     use crate::response::envelope::Envelope;
+    use nalgebra::Vector6;
+
+    #[test]
+    fn a_block_times_its_inverse_is_one() {
+        for (scale, seed) in [(1.0, 1.0), (1e-6, 2.0), (1e9, 3.0)] {
+            let root = Matrix6::from_fn(|i, j| ((i * 5 + j * 3) as f64 * seed).sin());
+            let matrix = (root * root.transpose() + Matrix6::identity()) * scale;
+            let inverse = Block::inverse_of(&matrix).unwrap();
+            for column in 0..BLOCK {
+                let mut unit = Vector6::zeros();
+                unit[column] = 1.0;
+                let product = inverse.product(&Column::of((matrix * unit).as_slice()));
+                assert!((Vector6::from_column_slice(&product.0[..BLOCK]) - unit).norm() < 1e-12);
+            }
+        }
+        assert!(Block::inverse_of(&-Matrix6::identity()).is_none());
+        assert!(Block::inverse_of(&Matrix6::from_element(f64::NAN)).is_none());
+    }
 
     #[test]
     fn agrees_with_the_factor_on_a_chain_of_uneven_links() {
@@ -168,7 +324,7 @@ mod tests {
             envelope.add(i, i, &block);
             diagonal.push(block);
         }
-        blocks.entries().fill(-spring);
+        blocks.entries().fill(Block::of(&-spring));
         let right: Vec<f64> = (0..count * BLOCK).map(|i| ((i * 7) % 11) as f64 - 5.0).collect();
         let (mut direct, mut iterated) = (right.clone(), right);
         assert!(envelope.factor());

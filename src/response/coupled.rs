@@ -6,7 +6,7 @@
 
 use nalgebra::{Matrix6, Vector6};
 
-use super::conjugate::Blocks;
+use super::conjugate::{Block, Blocks};
 use super::envelope::{BLOCK, Envelope};
 use super::group::{Group, Member, Point, Push, Slope};
 use super::grouping::Bundle;
@@ -96,8 +96,11 @@ const QUICK: f64 = 1e-3;
 /// Products of a factor beyond which conjugate gradients are quicker.
 const WIDE: usize = 100_000;
 
-/// Least and most that conjugate gradients leave of a Newton step. What the matrix lacks leaves about a hundredth.
-const GRADIENTS: (f64, f64) = (5e-3, 5e-2);
+/// Least and most that conjugate gradients leave of a Newton step.
+const GRADIENTS: (f64, f64) = (5e-3, 1e-1);
+
+/// What they may leave, over what the last Newton step left: that is what the matrix lacks, and nothing else mends it.
+const LACK: f64 = 0.2;
 
 /// Most conjugate gradients in one Newton step.
 const MOST_GRADIENTS: usize = 400;
@@ -205,7 +208,9 @@ impl Coupled {
                 fresh = true;
             }
             self.step.clone_from(&self.residual);
-            let left = (0.3 * (enough / norm).sqrt()).clamp(GRADIENTS.0, GRADIENTS.1);
+            let needed = 0.3 * (enough / norm).sqrt();
+            let lost = if last.is_finite() { LACK * (norm / last).sqrt() } else { 0.0 };
+            let left = needed.max(lost).clamp(GRADIENTS.0, GRADIENTS.1);
             if !self.solve_step(left, fresh, team) {
                 return false;
             }
@@ -410,7 +415,7 @@ impl Coupled {
         if self.wide {
             let entries = self.blocks_of_matrix.entries();
             team.each_mut(entries, team.share(couplings.len(), GROUPS), |index, entry| {
-                *entry = block(index).unwrap_or_else(Matrix6::zeros);
+                *entry = block(index).map_or_else(Block::default, |block| Block::of(&block));
             });
             return;
         }

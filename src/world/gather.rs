@@ -244,7 +244,8 @@ fn swept(shape: &Shape, margin: f64, motion: &Motion, dt: f64) -> (Vec3, Vec3) {
 
 /// Whether all of a region is farther than `reach` above a plane, which has no bounds that would tell.
 fn is_above(shape: &Shape, pose: &Pose, reach: f64, region: &(Vec3, Vec3)) -> bool {
-    let Shape::Plane { point, normal } = shape.transformed(pose) else { return false };
+    let Shape::Plane { point, normal } = shape else { return false };
+    let (point, normal) = (pose.transform_point(point), pose.rotation * normal);
     let (middle, half) = ((region.0 + region.1) * 0.5, (region.1 - region.0) * 0.5);
     // Two planes meet in a region without bounds, which is not above anything.
     (middle - point).dot(&normal) - half.dot(&normal.abs()) > reach
