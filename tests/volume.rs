@@ -157,15 +157,19 @@ fn total_volume_is_kept_while_balls_and_blobs_merge() {
     }
 }
 
-/// A muscle of five points that blend, between two segments of bone.
-fn arm(spacing: f64) -> Limb {
-    let t = 0.04;
+/// A muscle of five points that blend, between two segments of bone; the thickness is 0.04 of the size.
+fn arm_of_size(size: f64, spacing: f64) -> Limb {
+    let (t, spacing) = (0.04 * size, spacing * size);
     let bone = |from: f64, to: f64| Shape::segment(Vec3::new(from, 0.0, 0.0), Vec3::new(to, 0.0, 0.0));
     let mut shapes: Vec<Shape> = (0..5).map(|k| point(spacing * f64::from(k), 0.0)).collect();
-    shapes.extend([bone(-0.3, -spacing), bone(5.0 * spacing, 5.0 * spacing + 0.25)]);
+    shapes.extend([bone(-0.3 * size, -spacing), bone(5.0 * spacing, 5.0 * spacing + 0.25 * size)]);
     let mut limb = Limb::new(0.5, t, 2.0 * t, &[shapes]);
     limb.world.step(DT).unwrap();
     limb
+}
+
+fn arm(spacing: f64) -> Limb {
+    arm_of_size(1.0, spacing)
 }
 
 /// Steps on, and gives the volumes over the targets after each step.
@@ -226,8 +230,7 @@ fn a_muscle_flexes_to_twice_its_volume_and_back_without_swinging() {
     }
 }
 
-/// Neighbours of a part whose target doubles at once are pushed back for a moment; if it doubles over half a second,
-/// hardly.
+/// Whether the target doubles at once, or over half a second.
 #[test]
 fn neighbours_of_a_flexing_part_keep_their_volume() {
     for ramp in [1, 30] {
@@ -250,7 +253,126 @@ fn neighbours_of_a_flexing_part_keep_their_volume() {
             100.0 * neighbours,
             100.0 * own
         );
-        assert!(own.abs() < 0.02 && neighbours < 0.03 && on_the_way < if ramp == 1 { 0.15 } else { 0.05 });
+        assert!(own.abs() < 0.02 && neighbours < 0.03 && on_the_way < 0.03);
+    }
+}
+
+/// What comes of doubling the targets of some parts at once, and taking them back at once after half a second.
+#[derive(Debug, Default)]
+struct Flexed {
+    /// The largest error of anybody else in any step.
+    beside: f64,
+    /// Of the parts: their largest errors after half a second, how far they went beyond, the steps until within 2 %.
+    late: f64,
+    beyond: f64,
+    took: usize,
+}
+
+fn flexed(seeds: u32, size: f64, spacing: f64, dt: f64, parts: &[usize]) -> Flexed {
+    let mut limb = arm_of_size(size, spacing);
+    limb.world.set_desc(WorldDesc { seed_count: seeds, ..WorldDesc::default() }).unwrap();
+    let rest = limb.volumes();
+    for (skeleton, volume) in limb.skeletons.clone().into_iter().zip(&rest) {
+        limb.world.set_skeleton_target_volume(skeleton, *volume).unwrap();
+    }
+    let steps = (0.5 / dt + 1e-9) as usize;
+    let mut out = Flexed::default();
+    for factor in [2.0, 1.0] {
+        for part in parts {
+            limb.world.set_skeleton_target_volume(limb.skeletons[*part], factor * rest[*part]).unwrap();
+        }
+        for step in 1..=steps {
+            limb.world.step(dt).unwrap();
+            for (k, volume) in limb.volumes().iter().enumerate() {
+                if !parts.contains(&k) {
+                    out.beside = out.beside.max((volume / rest[k] - 1.0).abs());
+                    continue;
+                }
+                let error = volume / (factor * rest[k]) - 1.0;
+                out.beyond = out.beyond.max(if factor > 1.0 { error } else { -error });
+                out.took = if error.abs() < 0.02 { out.took } else { out.took.max(step + 1) };
+                out.late = if step == steps { out.late.max(error.abs()) } else { out.late };
+            }
+        }
+    }
+    out
+}
+
+#[test]
+fn who_flexes_at_once_is_there_in_half_a_second_and_leaves_its_neighbours_alone() {
+    // So near each other, 64 seeds see less of a border than it moves.
+    let spacings = [(512, 0.02), (64, 0.03), (64, 0.04), (64, 0.05)];
+    let spacings = spacings.map(|(seeds, spacing)| (seeds, 1.0, spacing, 1.0 / 15.0));
+    let sizes = [1e-3, 1.0, 1e3]
+        .into_iter()
+        .flat_map(|size| [1.0 / 240.0, 1.0 / 60.0, 1.0 / 15.0].map(|dt| (64, size, 0.04, dt)));
+    for (seeds, size, spacing, dt) in spacings.into_iter().chain(sizes) {
+        for (name, parts) in [("one part", &[2][..]), ("two parts", &[1, 2]), ("all parts", &[0, 1, 2, 3, 4])] {
+            let flexed = flexed(seeds, size, spacing, dt, parts);
+            println!(
+                "size {size}, {:.2} thicknesses apart, {seeds} seeds, steps of {:.1} ms, {name}: within 2 % after {:.3} s; \
+                 neighbours off by {:.2} % on the way, overshoot {:.2} %, error after 0.5 s {:.3} %",
+                spacing / 0.04,
+                1e3 * dt,
+                flexed.took as f64 * dt,
+                100.0 * flexed.beside,
+                100.0 * flexed.beyond,
+                100.0 * flexed.late
+            );
+            // Where 64 rays see the border as it is; nearer and farther it is rougher.
+            let most = if (0.03..=0.04).contains(&spacing) { 0.03 } else { 0.04 };
+            assert!(flexed.beside < most && flexed.late < 0.02 && flexed.beyond < 0.02, "{flexed:?}");
+        }
+    }
+}
+
+/// Whatever shapes lie near each other, and however much or little of each is on the surface: control comes to rest.
+#[test]
+fn control_of_heaps_comes_to_rest() {
+    let mut state = 1u64;
+    let mut random = || {
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (state >> 33) as f64 / f64::from(1u32 << 31)
+    };
+    for spread in [0.3, 0.6, 1.0, 1.5] {
+        let mut worst = (0usize, 0.0f64, 0);
+        for _ in 0..6 {
+            let shapes: Vec<Vec<Shape>> = (0..10)
+                .map(|k| {
+                    let mut at = |width: f64| Vec3::new(random() - 0.5, random() - 0.5, random() - 0.5) * width;
+                    let (a, b, c) = (at(3.0 * spread), at(1.0), at(1.0));
+                    vec![match k % 4 {
+                        0 => Shape::segment(a, a + b),
+                        1 => Shape::triangle(a, a + b, a + c),
+                        2 => Shape::Box { center: a, half: b.abs() * 0.4 + Vec3::repeat(0.05), axes: Mat3::identity() },
+                        _ => Shape::Point(a),
+                    }]
+                })
+                .collect();
+            let mut limb = Limb::new(0.5, 0.5, 1.0, &shapes);
+            limb.world.step(DT).unwrap();
+            for id in limb.skeletons.clone() {
+                let volume = limb.world.skeleton_volume(id).unwrap();
+                if volume > 0.0 {
+                    limb.world.set_skeleton_target_volume(id, volume * (0.7 + 0.8 * random())).unwrap();
+                }
+            }
+            let mut last = limb.offsets();
+            let mut still = 0;
+            for step in 1..=300 {
+                limb.world.step(DT).unwrap();
+                let next = limb.offsets();
+                let moved = next.iter().zip(&last).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                if moved > 1e-3 * 0.5 {
+                    still = step;
+                }
+                worst.1 = if step == 300 { worst.1.max(moved) } else { worst.1 };
+                last = next;
+            }
+            worst.0 = worst.0.max(still);
+        }
+        println!("heaps {spread}: last step with a move above a thousandth {}, then {:.1e}", worst.0, worst.1);
+        assert!(worst.1 < 1e-6);
     }
 }
 

@@ -20,11 +20,14 @@ inline btVector3 bullet(const isocoat::vec3 &v) { return btVector3(btScalar(v[0]
 /// A dynamics world with three stairs, and the character above the topmost, about to fall on its side.
 class fall {
 public:
-    explicit fall(double tick = 1.0 / 60.0) : coats(settings()), tick_(tick), coupler_(coats.get(), &dynamics_) {
+    /// The push at its shoulders [N s] decides how it comes to lie.
+    explicit fall(double push = 40.0, double tick = 1.0 / 60.0)
+        : coats(settings()), tick_(tick), coupler_(coats.get(), &dynamics_) {
         dynamics_.setGravity(btVector3(0, 0, btScalar(-9.81)));
         dynamics_.addAction(&coupler_);
         build_stairs();
         build_character();
+        body(1).applyCentralImpulse(btVector3(btScalar(push), 0, 0));
     }
 
     ~fall() {
@@ -90,6 +93,7 @@ private:
     static isocoat_world_desc settings() {
         isocoat_world_desc desc = isocoat_world_desc_default();
         desc.force_tolerance = 5e-2;
+        desc.timed = 1;
         return desc;
     }
 
@@ -151,8 +155,6 @@ private:
                 add_joint(part, body(i), body(std::size_t(part.parent)));
             }
         }
-        // A push to its side, at the shoulders.
-        body(1).applyCentralImpulse(btVector3(40, 0, 0));
     }
 
     /// On the topmost stair.

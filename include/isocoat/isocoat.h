@@ -2826,8 +2826,8 @@ isocoat_status isocoat_skeleton_get_target_volume(const isocoat_world *world,
                                                   double *target);
 
 /**
- * Sets the volume that volume control aims at for a skeleton: a muscle that flexes. The surface moves by at most a
- * tenth of the skeleton's thickness in a step, and by at most half of it inwards and all of it outwards in all.
+ * Sets the volume that volume control aims at for a skeleton: a muscle that flexes. The surface moves by at most an
+ * eighth of the skeleton's thickness in a step, and by at most half of it inwards and all of it outwards in all.
  *
  * - world: not NULL.
  * - skeleton: the skeleton.

@@ -82,8 +82,8 @@ pub unsafe extern "C" fn isocoat_skeleton_get_target_volume(
     }
 }
 
-/// Sets the volume that volume control aims at for a skeleton: a muscle that flexes. The surface moves by at most a
-/// tenth of the skeleton's thickness in a step, and by at most half of it inwards and all of it outwards in all.
+/// Sets the volume that volume control aims at for a skeleton: a muscle that flexes. The surface moves by at most an
+/// eighth of the skeleton's thickness in a step, and by at most half of it inwards and all of it outwards in all.
 ///
 /// - world: not NULL.
 /// - skeleton: the skeleton.

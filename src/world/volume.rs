@@ -6,7 +6,7 @@
 use super::query::PosedCoat;
 use super::step::Stepping;
 use super::{Body, BodyId, Skeleton, SkeletonId, World, sleep};
-use crate::coat::volume::{self, Share};
+use crate::coat::volume::{self, LOOKS, Loss, Part};
 use crate::error::{Error, Result, require};
 use crate::field::Shape;
 use crate::math::Pose;
@@ -21,8 +21,9 @@ pub(crate) struct Control {
     poses: Vec<Pose>,
     posed: PosedCoat,
     around: Vec<usize>,
-    /// Offsets and targets for the skeletons of `posed`.
-    found: Vec<(f64, f64)>,
+    /// One for each skeleton of `posed`.
+    parts: Vec<Part>,
+    losses: Vec<Loss>,
 }
 
 /// The links of a body in the frame of the first, which is the same for every motion of the body as a whole.
@@ -67,7 +68,7 @@ impl World {
 
     /// Finds the next offsets of a body, unless it is settled.
     fn look(&self, body: &Body, control: &mut Control) {
-        let Control { settled, poses, posed, around, found } = control;
+        let Control { settled, poses, posed, around, parts, losses } = control;
         *settled &= relative_poses(self, body).eq(poses.iter().copied());
         if *settled {
             return;
@@ -75,46 +76,61 @@ impl World {
         poses.clear();
         poses.extend(relative_poses(self, body));
         self.fill_coat(body, poses.iter().copied(), posed);
-        found.clear();
-        for index in 0..posed.skeletons.len() {
-            let skeleton = &self.skeletons[posed.skeletons[index]];
-            found.push(match self.share(posed, index, around) {
-                Some(share) => {
-                    let target = skeleton.target.unwrap_or(share.volume);
-                    let (gain, thickness) = (body.desc.volume_gain, skeleton.desc.thickness);
-                    (volume::next_offset(skeleton.offset, gain, &share, target, thickness), target)
+        parts.clear();
+        parts.extend(posed.skeletons.iter().map(|index| {
+            let Skeleton { desc, offset, .. } = &self.skeletons[*index];
+            Part { thickness: desc.thickness, offset: *offset, ..Part::default() }
+        }));
+        for look in 0..LOOKS {
+            losses.clear();
+            for (index, part) in parts.iter_mut().enumerate() {
+                let skeleton = &self.skeletons[posed.skeletons[index]];
+                // A plane has no bounds: nothing of it is ever exposed.
+                if !matches!(skeleton.desc.shape, Shape::Plane { .. }) {
+                    let rays = skeleton.rays(self.desc.seed_count);
+                    let pose = &posed.poses[index];
+                    part.share = volume::measure(&posed.coat, index, &rays, pose, around, losses);
                 }
-                None => (0.0, 0.0),
-            });
+                if look == 0 {
+                    part.target = skeleton.target.unwrap_or(part.share.volume);
+                }
+                part.end = losses.len();
+            }
+            if volume::move_offsets(parts, losses, body.desc.volume_gain) {
+                break;
+            }
+            for (placed, part) in posed.coat.skeletons.iter_mut().zip(&*parts) {
+                placed.profile = placed.profile.inflated(part.change);
+            }
         }
     }
 
-    /// What skeleton `index` of a coat has of it. None for a plane, which has no bounds.
-    fn share(&self, posed: &PosedCoat, index: usize, around: &mut Vec<usize>) -> Option<Share> {
+    /// The volume of skeleton `index` of a coat. None for a plane, which has no bounds.
+    fn volume(&self, posed: &PosedCoat, index: usize, around: &mut Vec<usize>) -> Option<f64> {
         let skeleton = &self.skeletons[posed.skeletons[index]];
         if matches!(skeleton.desc.shape, Shape::Plane { .. }) {
             return None;
         }
         let rays = skeleton.rays(self.desc.seed_count);
-        Some(volume::measure(&posed.coat, index, &rays, &posed.poses[index], around))
+        Some(volume::volume(&posed.coat, index, &rays, &posed.poses[index], around))
     }
 
     /// Sets what was found. Whether an offset has changed.
     fn apply(&mut self, body: usize, control: &Control) -> bool {
         let isovalue = self.bodies[body].desc.isovalue;
         let mut changed = false;
-        for (index, (offset, target)) in control.posed.skeletons.iter().zip(&control.found) {
+        for (index, part) in control.posed.skeletons.iter().zip(&control.parts) {
             let skeleton = &mut self.skeletons[*index];
             if matches!(skeleton.desc.shape, Shape::Plane { .. }) {
                 continue;
             }
-            skeleton.target = Some(*target);
-            if *offset != skeleton.offset {
+            skeleton.target = Some(part.target);
+            if part.offset != skeleton.offset {
                 changed = true;
-                skeleton.offset = *offset;
+                skeleton.offset = part.offset;
                 // Its descriptor was checked when it came.
                 if let Ok(profile) = skeleton.desc.profile(isovalue) {
-                    skeleton.profile = profile.inflated(*offset);
+                    skeleton.profile = profile.inflated(skeleton.offset);
                 }
             }
         }
@@ -164,7 +180,7 @@ impl World {
         }
         let posed = self.own_coat(self.links[skeleton.link as usize].body as usize);
         let index = posed.skeletons.iter().position(|index| *index == id.index());
-        Ok(index.and_then(|index| self.share(&posed, index, &mut Vec::new())).map_or(0.0, |share| share.volume))
+        Ok(index.and_then(|index| self.volume(&posed, index, &mut Vec::new())).unwrap_or(0.0))
     }
 
     /// The volume of a body's solid now \[m³\]: that of all territories of its enabled skeletons, or, of a substance, of
@@ -175,8 +191,8 @@ impl World {
             return Ok(substance.particles.iter().map(|particle| particle.volume).sum());
         }
         let (posed, mut around) = (self.own_coat(id.index()), Vec::new());
-        let volumes = (0..posed.skeletons.len()).map(|index| self.share(&posed, index, &mut around));
-        volumes.map(|share| share.map(|share| share.volume)).sum::<Option<f64>>().ok_or(NO_BOUNDS)
+        let volumes = (0..posed.skeletons.len()).map(|index| self.volume(&posed, index, &mut around));
+        volumes.sum::<Option<f64>>().ok_or(NO_BOUNDS)
     }
 
     /// The volume that volume control aims at for a skeleton \[m³\].
@@ -193,7 +209,7 @@ impl World {
     /// Sets the volume that volume control aims at for a skeleton, > 0 and at most 1e30 \[m³\]: a muscle that flexes.
     /// Refused without volume control, see [`BodyDesc::volume_gain`](super::BodyDesc::volume_gain), and for a plane.
     ///
-    /// The surface moves by at most a tenth of the thickness in a step, and by at most half the thickness inwards and
+    /// The surface moves by at most an eighth of the thickness in a step, and by at most half the thickness inwards and
     /// one thickness outwards in all.
     pub fn set_skeleton_target_volume(&mut self, id: SkeletonId, target: f64) -> Result<()> {
         let skeleton = self.controlled(id)?;
