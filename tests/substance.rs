@@ -676,8 +676,20 @@ fn places_mean(world: &World, body: BodyId) -> Vec3 {
     places.iter().sum::<Vec3>() / places.len() as f64
 }
 
+/// A rigid hand, palm down: a box, four fingers and a thumb.
+fn hand(world: &mut World, center: Vec3) -> LinkId {
+    let link = tool(world, center, Vec3::new(0.05, 0.06, 0.012), 0.01, 0.3);
+    let fingers = [-0.045, -0.015, 0.015, 0.045].map(|y| [Vec3::new(0.05, y, 0.0), Vec3::new(0.15, y, -0.015)]);
+    let thumb = [Vec3::new(-0.02, -0.06, 0.0), Vec3::new(0.05, -0.11, -0.015)];
+    for [from, to] in fingers.into_iter().chain([thumb]) {
+        let shape = Shape::Segment(from, to);
+        world.create_skeleton(link, SkeletonDesc { shape, thickness: 0.012, ..SkeletonDesc::default() }).unwrap();
+    }
+    link
+}
+
 #[test]
-fn three_substances_under_pin_and_knife_never_mix() {
+fn three_substances_under_pin_knife_and_hand_never_mix() {
     let mut world = world(G);
     ground(&mut world);
     let bodies = [(-0.3, 1.0), (0.0, 0.5), (0.3, 2.0)].map(|(x, stiffer)| {
@@ -693,7 +705,8 @@ fn three_substances_under_pin_and_knife_never_mix() {
     let shape = Shape::Segment(Vec3::new(0.0, -0.4, 0.0), Vec3::new(0.0, 0.4, 0.0));
     world.create_skeleton(pin, SkeletonDesc { shape, thickness: 0.08, ..SkeletonDesc::default() }).unwrap();
     let knife = tool(&mut world, Vec3::new(0.3, 0.0, 0.5), Vec3::new(0.002, 0.3, 0.15), 0.004, 0.05);
-    let mut worst = [0.0_f64; 3];
+    let hand = hand(&mut world, Vec3::new(-0.2, -0.06, 0.45));
+    let (mut worst, mut pressed) = ([0.0_f64; 3], 0.0_f64);
     for step in 0..240 {
         let t = step as f64 / 60.0;
         let rolling = if t < 2.0 { Vec3::new(0.35, 0.0, 0.0) } else { Vec3::new(0.0, 0.0, 0.3) };
@@ -701,7 +714,21 @@ fn three_substances_under_pin_and_knife_never_mix() {
         let cutting = if (2.0..3.3).contains(&t) { Vec3::new(0.0, 0.0, -0.344 / 1.3) } else { Vec3::zeros() };
         drive(&mut world, pin, rolling);
         drive(&mut world, knife, cutting);
+        // Down to 8 cm above the ground, and up again.
+        let pressing = if (2.0..3.3).contains(&t) { -0.37 / 1.3 } else { 0.0 } + if t >= 3.3 { 0.4 } else { 0.0 };
+        drive(&mut world, hand, Vec3::new(0.0, 0.0, pressing));
         world.step(1.0 / 60.0).unwrap();
+        let on_hand = world.contacts().iter().filter(|contact| contact.links.contains(&hand));
+        let force = on_hand.map(|contact| contact.force.norm()).sum::<f64>();
+        pressed = pressed.max(force);
+        assert!(t < 3.9 || force == 0.0, "the hand comes off: {force} N");
+        if step == 197 {
+            let palm = world.link_state(hand).unwrap().pose.position;
+            let under = |p: &&Vec3| (p.x - palm.x).abs() < 0.04 && (p.y - palm.y).abs() < 0.05;
+            let highest = places(&world, bodies[0]).iter().filter(under).map(|p| p.z).fold(0.0, f64::max);
+            println!("the palm is {:.3} m high, the highest particle under it {highest:.3} m", palm.z - 0.022);
+            assert!(highest > 0.0 && highest < palm.z - 0.022, "the hand leaves its print");
+        }
         for (body, worst) in bodies.into_iter().zip(&mut worst) {
             assert_sound(&world, body, "kitchen");
             *worst = worst.max(volume_errors(&world, body)[0].abs());
@@ -714,7 +741,8 @@ fn three_substances_under_pin_and_knife_never_mix() {
         let pieces: Vec<usize> = world.pieces(body).unwrap().iter().map(|piece| piece.particles.len()).collect();
         println!("from {low:.2?} to {high:.2?}, pieces {pieces:?}");
     }
-    println!("volumes off by {worst:.4?} at most");
+    println!("volumes off by {worst:.4?} at most; the hand pressed with up to {pressed:.0} N");
+    assert!(pressed > 1.0, "the hand presses");
     assert!(worst.iter().all(|worst| *worst < 0.03));
     assert!(world.pieces(bodies[2]).unwrap().len() > 1, "the knife cuts");
 }
