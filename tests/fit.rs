@@ -141,7 +141,7 @@ fn brute_force(random: &mut Random, from: &Closed, to: &Closed) -> (f64, f64) {
     let others: Vec<Shape> = to.corners().map(|[a, b, c]| Shape::triangle(a, b, c)).collect();
     let (mut sum, mut count, mut most, mut owed) = (0.0, 0.0, 0.0_f64, 0.0);
     for corners in from.corners() {
-        owed += 2000.0 * area(corners) / all;
+        owed += 800.0 * area(corners) / all;
         while owed > 0.0 {
             owed -= 1.0;
             let (u, v) = (random.unit(), random.unit());
@@ -158,7 +158,7 @@ fn brute_force(random: &mut Random, from: &Closed, to: &Closed) -> (f64, f64) {
 fn the_distance_told_is_that_of_brute_force() {
     let mut random = Random(3);
     for (name, mesh, count) in [
-        ("torus", torus(1.0, 0.3, 60, 24), 40),
+        ("torus", torus(1.0, 0.3, 30, 12), 40),
         ("box", cuboid(1.0, 0.7, 0.4), 60),
         ("corner", corner().moved(0.1, Vec3::new(0.3, 0.1, -0.7), Vec3::new(5.0, 6.0, 7.0)), 50),
     ] {
@@ -167,7 +167,7 @@ fn the_distance_told_is_that_of_brute_force() {
             let mut world = World::new(WorldDesc::default()).unwrap();
             let (body, link) = body(&mut world, Pose::default());
             world.create_fitted(&found, &[link], &Pose::default()).unwrap();
-            let coat = world.mesh(body, &MeshDesc::new(found.diagonal / 150.0)).unwrap();
+            let coat = world.mesh(body, &MeshDesc::new(found.diagonal / 100.0)).unwrap();
             let coat = Closed { vertices: coat.positions, triangles: coat.triangles };
             let there = brute_force(&mut random, &mesh, &coat);
             let back = brute_force(&mut random, &coat, &mesh);
@@ -180,9 +180,9 @@ fn the_distance_told_is_that_of_brute_force() {
                 relative(most),
                 relative(found.max_distance)
             );
-            assert!((mean / found.mean_distance - 1.0).abs() < 0.05);
+            assert!((mean / found.mean_distance - 1.0).abs() < 0.1);
             // Chance hardly meets the farthest point.
-            assert!(most < 1.02 * found.max_distance && most > 0.5 * found.max_distance);
+            assert!(most < 1.02 * found.max_distance && most > 0.4 * found.max_distance);
             assert!(relative(mean) < 0.6);
         }
     }
@@ -192,13 +192,13 @@ fn the_distance_told_is_that_of_brute_force() {
 fn more_skeletons_come_closer() {
     for primitive in [Primitive::Point, Primitive::Segment] {
         for (name, mesh) in [("torus", torus(1.0, 0.3, 60, 24)), ("box", cuboid(1.0, 0.7, 0.4))] {
-            let means = [5, 20, 60, 120].map(|count| {
+            let means = [5, 20, 80].map(|count| {
                 let found = mesh.fit(primitive, count);
                 assert!(found.skeletons.len() == count as usize && found.bones == vec![0; count as usize]);
                 100.0 * found.mean_distance / found.diagonal
             });
             println!("{name}, {primitive:?}: mean {means:.3?} % of the diagonal");
-            assert!(means.windows(2).all(|pair| pair[1] < 1.1 * pair[0]) && means[3] < 0.3 * means[0]);
+            assert!(means.windows(2).all(|pair| pair[1] < 1.1 * pair[0]) && means[2] < 0.3 * means[0]);
         }
     }
 }
@@ -372,7 +372,7 @@ fn meshes_that_enclose_nothing_are_refused_with_their_fault() {
     says(with(&|mesh| mesh.triangles.push([0, 9, 50])), &["an edge of the mesh is run", "run once each way"]);
     // Inside out, and flat.
     says(with(&|mesh| mesh.triangles.iter_mut().for_each(|t| t.swap(0, 1))), &["volume of the mesh is -", "> 0"]);
-    says(with(&|mesh| mesh.vertices.iter_mut().for_each(|p| p[2] = 0.0)), &["volume of the mesh", "at least"]);
+    says(with(&|mesh| mesh.vertices.iter_mut().for_each(|p| p[2] *= 1e-9)), &["volume of the mesh", "at least"]);
     says(with(&|mesh| mesh.vertices.fill([1.0; 3])), &["diagonal of the mesh is 0", "from 1e-9"]);
     for count in [0, 4097] {
         let desc = FitDesc { count, ..FitDesc::default() };

@@ -133,7 +133,7 @@ impl Tree {
         let mut best = None;
         let mut closest = limit;
         let mut later = [(0_usize, 0.0); DEPTH];
-        let Some(root) = self.nodes.first() else { return None };
+        let root = self.nodes.first()?;
         later[0] = (0, away(&root.low, &root.high));
         let mut waiting = 1;
         while waiting > 0 {

@@ -44,7 +44,7 @@ pub use substance::{Change, Fill, Particle, ParticleId, Piece, SubstanceDesc};
 use crate::base::link::Kind;
 use crate::error::{Error, Result};
 use crate::field::Profile;
-use crate::math::{Pose, Wrench};
+use crate::math::{Pose, Quat, Wrench};
 use crate::response::mirror::Mirror;
 use crate::team::{Alone, Tasks};
 
@@ -466,10 +466,12 @@ impl World {
         frame: Option<&Pose>,
     ) -> Result<Vec<SkeletonId>> {
         frame.map_or(Ok(()), desc::validate_pose)?;
+        let unit = |frame: &Pose| Pose { rotation: Quat::new_normalize(frame.rotation.into_inner()), ..*frame };
+        let frame = frame.map(unit);
         let mut placed = Vec::with_capacity(skeletons.len());
         for (link, desc) in skeletons {
             let mut desc = desc.clone();
-            if let Some(frame) = frame {
+            if let Some(frame) = &frame {
                 let pose = self.links.get(*link)?.desc.pose;
                 // One motion: in the frame of the link itself, what is given stays as it is.
                 let motion = Pose {

@@ -34,7 +34,7 @@ const STEPS: usize = 60;
 const TOLERANCE: f64 = 1e-3;
 /// Longest step of an end in a round, over the thickness and the width.
 const STRIDE: f64 = 0.5;
-/// Least slope of the straightened field, over what it would be if no fields pulled against each other.
+/// Least slope of the straightened field that a residual is measured by, over the slope round a single skeleton, `1 / w`.
 const FLAT: f64 = 0.25;
 
 /// A skeleton, in the frame of the target.
@@ -177,7 +177,7 @@ fn fill(
     for point in points {
         field.near(&point.at, near);
         parts.clear();
-        let (mut f, mut gradient, mut steepest) = (0.0, Vec3::zeros(), 0.0);
+        let (mut f, mut gradient) = (0.0, Vec3::zeros());
         for skeleton in &*near {
             let Placed { shape, profile } = &field.coat.skeletons[*skeleton as usize];
             let closest = shape.closest(&point.at);
@@ -185,14 +185,13 @@ fn fill(
             if value > 0.0 {
                 f += value;
                 gradient += closest.normal * slope;
-                steepest += slope.abs();
                 parts.push((*skeleton, closest.normal, slope));
             }
         }
         point.slope = 0.0;
         if f > 0.0 {
             let (excess, bend) = straight(f);
-            point.slope = bend * gradient.norm().max(FLAT * steepest);
+            point.slope = (bend * gradient.norm()).max(FLAT / settings.width);
             for (skeleton, normal, slope) in &parts {
                 // By the distance, and so against the thickness.
                 let by_distance = bend / point.slope * slope;
