@@ -279,7 +279,7 @@ fit: $(BUNNY) $(WORK)/examples/fit viewer ## coats fitted to a bunny, beside a l
 	@mkdir -p $(OUT)/fit
 	@'$(WORK)/examples/fit' '$(BUNNY)' --record '$(WORK)/fit/bunny.reel'
 	@'$(VIEWER)' still '$(WORK)/fit/bunny.reel' $(OUT)/fit/bunny.png --frame 0 --paint skeletons \
-		--eye 0.9,-2.2,1.5 --target 0,0,0.85 --width 1.5 --size 640x560
+		--hide 0 --shape none --eye 0.9,-2.2,1.3 --target 0,0,0.6 --width 1.2 --size 480x420
 
 .PHONY: bench
 bench: ## measure
