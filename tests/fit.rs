@@ -365,7 +365,7 @@ fn meshes_that_enclose_nothing_are_refused_with_their_fault() {
     says(with(&|mesh| mesh.triangles.clear()), &["no triangles"]);
     says(with(&|mesh| mesh.triangles.truncate(3)), &["number of triangles with an area is 3", "at least 4"]);
     // Open.
-    says(with(&|mesh| drop(mesh.triangles.pop())), &["an edge of the mesh is run 0 times", "1 times back", "closed"]);
+    says(with(&|mesh| mesh.triangles.truncate(191)), &["an edge of the mesh is run 0 times", "1 times back", "closed"]);
     // One triangle turned round.
     says(with(&|mesh| mesh.triangles[7].swap(0, 1)), &["an edge of the mesh is run", "all turn one way"]);
     // A fin on an edge.
@@ -403,7 +403,7 @@ fn lattice(mesh: &Closed, count: usize) -> (usize, measure::Distance) {
         coat.skeletons.extend(balls.iter().map(|ball| Placed { shape: Shape::Point(*ball), profile }));
         measure::distance(&target, coat, large).unwrap()
     };
-    let each = (1..=20).map(|k| of(0.05 * f64::from(k) * large));
+    let each = (4..=14).map(|k| of(0.05 * f64::from(k) * large));
     (balls.len(), each.min_by(|a, b| a.mean.total_cmp(&b.mean)).unwrap())
 }
 
