@@ -117,7 +117,7 @@ demo-plot:
 	@mkdir -p $(OUT)
 	$(CARGO) run --release --quiet --example two_balls_plot -- $(OUT)/two_balls.svg
 
-SCENES := collision clover muscle jelly dough skin sleeve cpp/bowl cpp/walk cpp/bullet_character
+SCENES := collision clover muscle jelly dough skin sleeve fit cpp/bowl cpp/walk cpp/bullet_character
 
 .PHONY: scenes
 scenes: $(SCENES:%=$(WORK)/examples/%) ## characters, muscles, jelly: run each scene, with pictures in out/
@@ -266,6 +266,20 @@ peers: ## isocoat beside Bullet's soft bodies, Drake's hydroelastic contact and 
 	-@'$(PEERS_PYTHON)' -c 'import pydrake' 2>/dev/null || { echo 'Installing: drake, with pip, under target/'; \
 		python3 -m venv '$(TARGET)/peers/venv' && '$(PEERS_PYTHON)' -m pip install --quiet drake; }
 	@python3 tools/peers/run.py '$(PEERS)' '$(PEERS_PYTHON)'
+
+# The bunny is no part of the repository.
+BUNNY := $(WORK)/fit/bunny.obj
+
+$(WORK)/fit/bunny.obj:
+	@tools/bunny.sh '$@'
+
+.PHONY: fit
+fit: $(BUNNY) $(WORK)/examples/fit viewer ## coats fitted to a bunny, beside a lattice of balls, and a picture in out/ (fetches it)
+	@ISOCOAT_FIT_MESH='$(BUNNY)' $(CARGO) test --release --quiet --test fit -- --ignored --nocapture
+	@mkdir -p $(OUT)/fit
+	@'$(WORK)/examples/fit' '$(BUNNY)' --record '$(WORK)/fit/bunny.reel'
+	@'$(VIEWER)' still '$(WORK)/fit/bunny.reel' $(OUT)/fit/bunny.png --frame 0 --paint skeletons \
+		--hide 0 --shape none --eye 0.9,-2.2,1.3 --target 0,0,0.6 --width 1.2 --size 480x420
 
 .PHONY: bench
 bench: ## measure

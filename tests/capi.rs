@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use isocoat::capi::{
-    body, buffer, draw, handle, link, math, mesh, motion, piece, query, rays, recording, report, skeleton, spring,
+    body, buffer, draw, fit, handle, link, math, mesh, motion, piece, query, rays, recording, report, skeleton, spring,
     substance, world,
 };
 
@@ -197,6 +197,8 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
         }
         mesh::isocoat_mesh_desc { struct_size, deformation, cell_size }
         mesh::isocoat_mesh_view { positions, normals, triangles, valid, vertex_count, triangle_count }
+        fit::isocoat_fit_desc { struct_size, shape, count, reserved, width }
+        fit::isocoat_fit_distance { mean, maximum, diagonal }
         recording::isocoat_recorder_desc { struct_size, key_interval, context, write }
         draw::isocoat_debug_draw { struct_size, flags, context, draw_line, draw_point }
     }

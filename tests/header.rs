@@ -31,6 +31,7 @@ const SECTIONS: &[(&str, &str)] = &[
     ("rays", ""),
     ("mesh", "Meshes"),
     ("skin", "Skins"),
+    ("fit", "Coats from meshes"),
     ("volume", "Volumes"),
     ("substance", "Substances"),
     ("particle", ""),

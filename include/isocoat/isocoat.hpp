@@ -50,6 +50,7 @@ using particle = isocoat_particle; /* a name in its substance */
 using piece = isocoat_piece;
 using change = isocoat_change;
 using mesh_view = isocoat_mesh_view;
+using fit_distance = isocoat_fit_distance;
 
 /* The status of a call that failed; what() says what was wrong, with the value and the range. */
 class error : public std::runtime_error {
@@ -195,6 +196,34 @@ struct change_list {
     }
 };
 
+/* A coat fitted to a mesh: one element each in the two, in the frame of the mesh, and how close it comes. */
+struct fitted_coat {
+    std::vector<isocoat_skeleton_desc> skeletons;
+    std::vector<std::uint32_t> bones;
+    fit_distance distance;
+};
+
+/* Fits a coat to a closed mesh. Bones and weights: as many of each vertex, in a row; none for one bone alone. */
+inline fitted_coat fit_mesh(const isocoat_fit_desc &desc, span<const vec3> vertices,
+                            span<const std::array<std::uint32_t, 3>> triangles, span<const std::uint32_t> bones = {},
+                            span<const double> weights = {})
+{
+    const std::size_t influences = bones.empty() || vertices.empty() ? 0 : bones.size() / vertices.size();
+    if (weights.size() != bones.size() || influences * vertices.size() != bones.size())
+        throw std::invalid_argument("bones and weights must be as many, and as many of each vertex");
+    fitted_coat coat;
+    coat.skeletons.assign(desc.count, isocoat_skeleton_desc_default());
+    coat.bones.resize(desc.count);
+    /* There is always a place to point at, so that a count of 0 is refused as what it is. */
+    isocoat_skeleton_desc none = isocoat_skeleton_desc_default();
+    check(isocoat_fit_mesh(&desc, source(vertices.empty() ? nullptr : vertices.data()->data()), vertices.size(),
+                           triangles.empty() ? nullptr : triangles.data()->data(), triangles.size(),
+                           bones.empty() ? nullptr : bones.data(), source(weights.data()), influences,
+                           coat.skeletons.empty() ? &none : coat.skeletons.data(), coat.bones.data(), desc.count,
+                           &coat.distance));
+    return coat;
+}
+
 class link;
 
 /* A mesh of triangles, with the memory that making one takes: used again, it soon asks for no more. Movable, not
@@ -321,6 +350,14 @@ public:
     skeleton create_skeleton(const isocoat_skeleton_desc &desc)
     {
         return {world_, detail::read(isocoat_skeleton{}, isocoat_skeleton_create, world_, raw_, &desc)};
+    }
+    /* All of them, or none if one is refused; in the frame of the link. */
+    std::vector<skeleton> create_skeletons(span<const isocoat_skeleton_desc> descs)
+    {
+        std::vector<isocoat_skeleton> made(descs.size());
+        check(isocoat_skeleton_create_many(world_, &raw_, 1, descs.data(), nullptr, descs.size(), nullptr,
+                                           made.data()));
+        return detail::name<skeleton>(world_, made);
     }
     std::vector<skeleton> skeletons() const
     {
@@ -509,6 +546,17 @@ public:
         check(isocoat_body_make_mesh(world_, raw_, &desc, out.get()));
     }
     /* Binds a mesh of the host to it, at the present poses; without normals it has the coat's. */
+    /* The skeletons of a fitted coat, each on the link of its bone; frame: the mesh's in the world, with the links where
+       they are now. */
+    std::vector<skeleton> create_fitted(const fitted_coat &coat, span<const link> links, const isocoat::pose &frame)
+    {
+        std::vector<isocoat_link> raw;
+        for (const link &each : links) raw.push_back(each.raw());
+        std::vector<isocoat_skeleton> made(coat.skeletons.size());
+        check(isocoat_skeleton_create_many(world_, raw.data(), raw.size(), coat.skeletons.data(), coat.bones.data(),
+                                           made.size(), &frame, made.data()));
+        return detail::name<skeleton>(world_, made);
+    }
     skin create_skin(isocoat_const_buffer vertices, isocoat_const_buffer normals, std::size_t count)
     {
         return {world_, detail::read(isocoat_skin{}, isocoat_skin_create, world_, raw_, vertices, normals, count)};

@@ -135,6 +135,32 @@ impl<T: Descriptor> OutStruct<T> {
     }
 }
 
+/// Where a row of structs goes, each of the size that the first one says.
+pub(super) struct OutRow<T> {
+    first: *mut T,
+    size: usize,
+}
+
+impl<T: Descriptor> OutRow<T> {
+    /// # Safety
+    /// `first` is NULL, or `count` structs of the size that the first one says can be written there until the call
+    /// returns.
+    pub unsafe fn new(first: *mut T, count: usize, name: &str) -> Checked<Self> {
+        // SAFETY: the caller's promise.
+        let size = unsafe { size_at(first.cast_const(), name) }?;
+        if count.checked_mul(size).is_none_or(|bytes| bytes > isize::MAX as usize) {
+            return Err(Refusal::argument(format!("the count of {name} is {count}: no memory is that large")));
+        }
+        Ok(Self { first, size })
+    }
+
+    /// Writes the struct at `index`, which is below the count.
+    pub fn put(&self, index: usize, value: &T) {
+        // SAFETY: within the row, as promised to `new`.
+        unsafe { put(self.first.wrapping_byte_add(index * self.size), self.size, value) }
+    }
+}
+
 /// # Safety
 /// `size` bytes can be written at `pointer`, and at least the size field fits.
 unsafe fn put<T: Descriptor>(pointer: *mut T, size: usize, value: &T) {

@@ -4,7 +4,7 @@
 //! [`mod@pointer`] and [`descriptor`] (memory of the host), [`handle`], [`buffer`]. Nouns: [`world`], [`body`],
 //! [`link`], [`skeleton`], [`blend`], [`spring`], [`substance`], [`particle`], [`piece`], [`math`], and what is done
 //! with them: [`motion`], [`bulk`], [`report`], [`snapshot`], [`recording`], [`query`], [`rays`], [`mesh`], [`skin`],
-//! [`draw`], [`tasks`], [`volume`].
+//! [`fit`], [`draw`], [`tasks`], [`volume`].
 //!
 //! Nothing here computes: every function checks the host's pointers, translates, calls the public Rust API, and
 //! translates back. The comments are the manual that goes into the header.
@@ -18,6 +18,7 @@ pub mod buffer;
 pub mod bulk;
 pub mod descriptor;
 pub mod draw;
+pub mod fit;
 pub mod guard;
 pub mod handle;
 pub mod link;

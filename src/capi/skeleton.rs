@@ -7,11 +7,12 @@ use libc::{c_void, size_t};
 use super::descriptor::{self, Descriptor, OutStruct};
 use super::guard::{free, isocoat_world, read, write};
 use super::handle::{isocoat_link, isocoat_skeleton};
-use super::pointer::Out;
+use super::math::isocoat_pose;
+use super::pointer::{self, Out, slice, slice_mut};
 use super::status::{Checked, ISOCOAT_ERROR_OUT_OF_RANGE, Refusal, isocoat_status};
 use super::world::unknown;
 use crate::field::Shape;
-use crate::math::{Quat, Vec3, rotation_from_vector, rotation_to_vector};
+use crate::math::{Pose, Quat, Vec3, rotation_from_vector, rotation_to_vector};
 use crate::world::SkeletonDesc;
 
 /// Which primitive a skeleton is: an ISOCOAT_SHAPE_ value. It says what the three points of the descriptor are, all in
@@ -164,6 +165,59 @@ pub unsafe extern "C" fn isocoat_skeleton_create(
         write(world, |inner| {
             let (desc, out) = (descriptor::read(desc, "desc")?, Out::new(skeleton, "skeleton")?);
             out.put(inner.world.create_skeleton(link.into(), desc.to_rust()?)?.into());
+            Ok(())
+        })
+    }
+}
+
+/// Creates many skeletons, such as those of isocoat_fit_mesh(): all of them, or none if one is refused.
+///
+/// - world: not NULL.
+/// - links: link_count links; not NULL.
+/// - link_count: number of links, at least 1.
+/// - descs: count skeletons in a row, all of the struct_size of the first; not NULL unless count is 0.
+/// - link_of: for each skeleton, which of the links carries it; NULL if the first one carries all.
+/// - count: number of skeletons.
+/// - frame: the frame of the descriptors in the world, from which the skeletons are brought to their links as these are
+///   now: the pose of the link for what is given in its frame, the identity for what is given in the world. NULL if each
+///   is in the frame of its own link.
+/// - skeletons: receives count handles; NULL when they are not wanted.
+///
+/// Errors: as isocoat_skeleton_create; OUT_OF_RANGE for a link_of too large or a frame that is none. Threads: changes
+/// the world.
+#[must_use]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn isocoat_skeleton_create_many(
+    world: *mut isocoat_world,
+    links: *const isocoat_link,
+    link_count: size_t,
+    descs: *const isocoat_skeleton_desc,
+    link_of: *const u32,
+    count: size_t,
+    frame: *const isocoat_pose,
+    skeletons: *mut isocoat_skeleton,
+) -> isocoat_status {
+    // SAFETY: the pointers are NULL or as their lines say.
+    unsafe {
+        write(world, |inner| {
+            let links = slice(links, link_count, "links")?;
+            let descs = descriptor::read_row(descs, count, "descs")?;
+            let link_of = slice(link_of, if link_of.is_null() { 0 } else { count }, "link_of")?;
+            let out = slice_mut(skeletons, count, "skeletons")?;
+            let frame = if frame.is_null() { None } else { Some(Pose::from(&pointer::read(frame, "frame")?)) };
+            let mut wanted = Vec::with_capacity(count);
+            for (index, desc) in descs.into_iter().enumerate() {
+                let number = link_of.get(index).copied().unwrap_or(0);
+                let Some(link) = links.get(number as usize) else {
+                    let message = format!("link_of[{index}] is {number}; must be less than link_count, {link_count}");
+                    return Err(Refusal::new(ISOCOAT_ERROR_OUT_OF_RANGE, message));
+                };
+                wanted.push(((*link).into(), desc.to_rust().map_err(|refusal| refusal.at("descs", index))?));
+            }
+            let made = inner.world.create_skeletons(&wanted, frame.as_ref())?;
+            for (out, made) in out.into_iter().flatten().zip(made) {
+                *out = made.into();
+            }
             Ok(())
         })
     }

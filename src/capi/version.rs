@@ -85,6 +85,8 @@ const LAYOUTS: &[Layout] = &[
     fixed::<super::buffer::isocoat_const_buffer>("isocoat_const_buffer"),
     growable::<super::rays::isocoat_rays_desc>(),
     growable::<super::rays::isocoat_ray_hits>(),
+    growable::<super::fit::isocoat_fit_desc>(),
+    fixed::<super::fit::isocoat_fit_distance>("isocoat_fit_distance"),
 ];
 
 /// What isocoat_check_abi calls: compares a host's version and struct sizes with the library's.

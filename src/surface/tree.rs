@@ -7,6 +7,8 @@ use crate::math::Vec3;
 const LEAF: usize = 4;
 /// Boxes are grown by this part of their size, so that rounding loses none.
 const SLACK: f64 = 1e-9;
+/// Nodes that may wait for their turn: enough for 2^47 boxes, as each level halves them.
+const DEPTH: usize = 48;
 
 /// Axis-aligned boxes, halved at the middle of the longest side again and again; those without bounds aside.
 #[derive(Clone, Debug, Default)]
@@ -124,11 +126,49 @@ impl Tree {
         });
     }
 
+    /// The item that is nearest to a point, with its distance, if one is not farther than `limit`. `distance` gives an
+    /// item's own, which is at least that of its box. Items without bounds are left out.
+    pub fn nearest(&self, p: &Vec3, limit: f64, mut distance: impl FnMut(u32) -> f64) -> Option<(u32, f64)> {
+        let away = |low: &Vec3, high: &Vec3| (p.sup(low).inf(high) - p).norm();
+        let mut best = None;
+        let mut closest = limit;
+        let mut later = [(0_usize, 0.0); DEPTH];
+        let root = self.nodes.first()?;
+        later[0] = (0, away(&root.low, &root.high));
+        let mut waiting = 1;
+        while waiting > 0 {
+            waiting -= 1;
+            let (at, bound) = later[waiting];
+            if bound > closest {
+                continue;
+            }
+            let node = &self.nodes[at];
+            if node.count > 0 {
+                for item in &self.items[node.at as usize..][..node.count as usize] {
+                    if away(&item.low, &item.high) <= closest {
+                        let own = distance(item.number);
+                        // Of equals the first one, so that nothing depends on how the boxes are sorted.
+                        if own < closest || own == closest && best.is_none_or(|number| item.number < number) {
+                            (best, closest) = (Some(item.number), own);
+                        }
+                    }
+                }
+                continue;
+            }
+            let child = |at: usize| (at, away(&self.nodes[at].low, &self.nodes[at].high));
+            let (first, second) = (child(at + 1), child(node.at as usize));
+            let (near, far) = if first.1 <= second.1 { (first, second) } else { (second, first) };
+            later[waiting] = far;
+            later[waiting + 1] = near;
+            waiting += 2;
+        }
+        best.map(|number| (number, closest))
+    }
+
     /// Goes through the items of all leaves that `enter` does not shut out.
     #[inline]
     fn walk(&self, enter: impl Fn(&Vec3, &Vec3) -> bool, mut each: impl FnMut(&Item)) {
-        // Deep enough for 2^48 boxes: each level halves them.
-        let mut later = [0_u32; 48];
+        let mut later = [0_u32; DEPTH];
         let mut depth = 0;
         let mut at = 0;
         while let Some(node) = self.nodes.get(at) {
@@ -188,6 +228,10 @@ mod tests {
                 let count = near.iter().filter(|told| **told == number as u32).count();
                 prop_assert!(count <= 1 && (count == 1) == (away <= length) || (away - length).abs() < 1e-6);
             }
+            let away = |number: usize| (origin.sup(&bounds[number].0).inf(&bounds[number].1) - origin).norm();
+            let expected = (0..bounds.len()).map(|number| (number as u32, away(number)));
+            let expected = expected.filter(|(_, away)| *away <= length).min_by(|a, b| a.1.total_cmp(&b.1));
+            prop_assert_eq!(tree.nearest(&origin, length, |number| away(number as usize)), expected);
         }
     }
 }

@@ -10,6 +10,7 @@ mod deformed;
 pub mod desc;
 pub mod draw;
 pub mod events;
+pub mod fit;
 mod gather;
 pub mod mesh;
 mod motion;
@@ -43,7 +44,7 @@ pub use substance::{Change, Fill, Particle, ParticleId, Piece, SubstanceDesc};
 use crate::base::link::Kind;
 use crate::error::{Error, Result};
 use crate::field::Profile;
-use crate::math::Wrench;
+use crate::math::{Pose, Quat, Wrench};
 use crate::response::mirror::Mirror;
 use crate::team::{Alone, Tasks};
 
@@ -458,6 +459,58 @@ impl World {
     /// Creates a skeleton of a link. A plane needs a link of kind fixed.
     pub fn create_skeleton(&mut self, link: LinkId, desc: SkeletonDesc) -> Result<SkeletonId> {
         let profile = self.check_skeleton(link, &desc)?;
+        let (id, body) = self.add_skeleton(link, desc, profile)?;
+        self.refresh(body);
+        Ok(id)
+    }
+
+    /// Creates many skeletons, each of the link beside it: all of them, or none if one is refused. Their shapes are in the
+    /// frames of their links; or, all of them, in one frame of the world, from which they are brought to their links as
+    /// these are now.
+    pub fn create_skeletons(
+        &mut self,
+        skeletons: &[(LinkId, SkeletonDesc)],
+        frame: Option<&Pose>,
+    ) -> Result<Vec<SkeletonId>> {
+        frame.map_or(Ok(()), desc::validate_pose)?;
+        let unit = |frame: &Pose| Pose { rotation: Quat::new_normalize(frame.rotation.into_inner()), ..*frame };
+        let frame = frame.map(unit);
+        let mut placed = Vec::with_capacity(skeletons.len());
+        for (link, desc) in skeletons {
+            let mut desc = desc.clone();
+            if let Some(frame) = &frame {
+                let pose = self.links.get(*link)?.desc.pose;
+                // One motion: in the frame of the link itself, what is given stays as it is.
+                let motion = Pose {
+                    position: pose.inverse_transform_point(&frame.position),
+                    rotation: pose.rotation.inverse() * frame.rotation,
+                };
+                desc.shape = desc.shape.transformed(&motion);
+            }
+            let profile = self.check_skeleton(*link, &desc)?;
+            placed.push((*link, desc, profile));
+        }
+        let (mut made, mut bodies) = (Vec::with_capacity(skeletons.len()), Vec::new());
+        for (link, desc, profile) in placed {
+            match self.add_skeleton(link, desc, profile) {
+                Ok((id, body)) => {
+                    made.push(id);
+                    bodies.push(body);
+                }
+                Err(error) => {
+                    made.into_iter().try_for_each(|id| self.destroy_skeleton(id))?;
+                    return Err(error);
+                }
+            }
+        }
+        bodies.sort_unstable();
+        bodies.dedup();
+        bodies.into_iter().for_each(|body| self.refresh(body));
+        Ok(made)
+    }
+
+    /// Adds a checked skeleton, and says to which body.
+    fn add_skeleton(&mut self, link: LinkId, desc: SkeletonDesc, profile: Profile) -> Result<(SkeletonId, usize)> {
         let id = self.skeletons.insert(Skeleton {
             desc,
             profile,
@@ -470,9 +523,7 @@ impl World {
         })?;
         let link = self.links.get_mut(link)?;
         link.skeletons.push(id.raw.index);
-        let body = link.body as usize;
-        self.refresh(body);
-        Ok(id)
+        Ok((id, link.body as usize))
     }
 
     fn check_skeleton(&self, link: LinkId, desc: &SkeletonDesc) -> Result<Profile> {

@@ -410,6 +410,29 @@ static void queries()
     }
 }
 
+static void fits()
+{
+    isocoat::world world;
+    isocoat::body body = world.create_body();
+    isocoat::link link = body.create_link(isocoat_link_desc_default());
+    const std::vector<isocoat::vec3> corners = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    const std::vector<std::array<std::uint32_t, 3>> triangles = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
+    isocoat_fit_desc desc = isocoat_fit_desc_default();
+    desc.count = 8;
+    const isocoat::fitted_coat coat = isocoat::fit_mesh(desc, corners, triangles);
+    CHECK(coat.skeletons.size() == 8 && coat.bones[7] == 0 && coat.distance.mean < 0.05);
+    CHECK(link.create_skeletons(coat.skeletons).size() == 8);
+    const std::vector<isocoat::link> links = {link};
+    CHECK(body.create_fitted(coat, links, link.state().pose).size() == 8 && link.skeletons().size() == 16);
+    try {
+        desc.count = 0;
+        isocoat::fit_mesh(desc, corners, triangles);
+        CHECK(false);
+    } catch (const isocoat::error &error) {
+        CHECK(error.status() == ISOCOAT_ERROR_OUT_OF_RANGE);
+    }
+}
+
 static void recordings()
 {
     isocoat::world world;
@@ -466,6 +489,7 @@ int main()
     what_a_callback_throws_comes_out_of_the_step();
     motion();
     snapshots();
+    fits();
     recordings();
     threads_help();
     substances();

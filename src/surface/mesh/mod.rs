@@ -21,7 +21,7 @@ mod lattice;
 mod root;
 pub mod table;
 
-use crate::error::Result;
+use crate::error::{Error, Result, out_of_range};
 pub use crate::field::lanes::{Cubes, Spans};
 use crate::math::Vec3;
 use bricks::{Bricks, Near};
@@ -74,6 +74,27 @@ impl Mesh {
         self.triangles.clear();
         self.valid.clear();
     }
+}
+
+/// Bounds of a host's mesh of triangles, as (low, high).
+///
+/// # Errors
+///
+/// When a coordinate is not finite, a corner of a triangle is no vertex, or there are no triangles.
+pub fn bounds(vertices: &[[f64; 3]], triangles: &[[u32; 3]]) -> Result<(Vec3, Vec3)> {
+    for (index, p) in vertices.iter().enumerate() {
+        if !p.iter().all(|x| x.abs() <= 1e60) {
+            let value = format_args!("({}, {}, {}) (number {index})", p[0], p[1], p[2]);
+            return Err(out_of_range("vertex of the mesh", value, "finite, at most 1e60"));
+        }
+    }
+    let most = triangles.iter().flatten().copied().max().ok_or(Error::Unsupported("the mesh has no triangles"))?;
+    if most as usize >= vertices.len() {
+        return Err(out_of_range("corner of a triangle of the mesh", most, "less than the number of vertices"));
+    }
+    let empty = (Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY));
+    let corners = triangles.iter().flatten().map(|corner| Vec3::from(vertices[*corner as usize]));
+    Ok(corners.fold(empty, |(low, high), p| (low.inf(&p), high.sup(&p))))
 }
 
 /// Memory of [`mesh`], to be used again: once it is large enough, a mesh asks for none.

@@ -11,6 +11,7 @@ use crate::error::{Error, Result, out_of_range, require, require_finite};
 use crate::math::Vec3;
 pub use crate::substance::{Change, Particle, ParticleId, SubstanceDesc};
 use crate::substance::{MOST_PARTICLES, Substance, fill};
+use crate::surface::mesh;
 
 mod step;
 
@@ -122,7 +123,7 @@ impl World {
                 require("radius of a ball to fill", *radius, "> 0", |x| x > 0.0)?;
                 (center - Vec3::repeat(*radius), center + Vec3::repeat(*radius))
             }
-            Fill::Mesh { vertices, triangles } => check_mesh(vertices, triangles)?,
+            Fill::Mesh { vertices, triangles } => mesh::bounds(vertices, triangles)?,
         };
         require_finite("corner of a shape to fill", &low)?;
         require_finite("corner of a shape to fill", &high)?;
@@ -273,17 +274,4 @@ fn check_states(positions: &[[f64; 3]], velocities: Option<&[[f64; 3]]>, count: 
         return Err(Error::Unsupported("velocities must be as many as particles"));
     }
     Ok(())
-}
-
-/// Bounds of a mesh.
-fn check_mesh(vertices: &[[f64; 3]], triangles: &[[u32; 3]]) -> Result<(Vec3, Vec3)> {
-    vertices.iter().try_for_each(|p| require_finite("corner of a mesh to fill", &Vec3::from(*p)))?;
-    let most =
-        triangles.iter().flatten().copied().max().ok_or(Error::Unsupported("a mesh to fill has no triangles"))?;
-    if most as usize >= vertices.len() {
-        return Err(out_of_range("corner of a triangle to fill", most, "below the number of vertices"));
-    }
-    let corners = || triangles.iter().flatten().map(|corner| Vec3::from(vertices[*corner as usize]));
-    let low = corners().fold(Vec3::repeat(f64::INFINITY), |low, p| low.inf(&p));
-    Ok((low, corners().fold(Vec3::repeat(f64::NEG_INFINITY), |high, p| high.sup(&p))))
 }
