@@ -108,6 +108,36 @@ fn center(desc: &SkeletonDesc) -> Vec3 {
 }
 
 #[test]
+fn more_points_than_a_ball_needs_share_it() {
+    let ball = mesh_of(Shape::Point(Vec3::zeros()), 1.0, 0.06);
+    let fit = ball.fit(Primitive::Point, 64);
+    let places: Vec<Vec3> = fit.skeletons.iter().map(center).collect();
+    let pairs = || (0..64).flat_map(|i| (0..i).map(move |j| (i, j)));
+    let least = pairs().map(|(i, j)| (places[i] - places[j]).norm()).fold(f64::INFINITY, f64::min);
+    println!(
+        "64 points: {:.2e} off on average, {:.2e} at most, {least:.2e} m apart at least",
+        fit.mean_distance, fit.max_distance
+    );
+    assert!(fit.mean_distance < 5e-3 * fit.diagonal && fit.max_distance < 3e-2 * fit.diagonal);
+    assert!(least > 1e-3, "those in one place would make the coat stiffer");
+}
+
+#[test]
+fn a_width_is_never_more_than_the_diagonal() {
+    // Shells in each other have much more surface than their bounds.
+    let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
+    for shell in 0..60 {
+        let size = 1.0 - 1e-3 * f64::from(shell);
+        let cube = cuboid(size, size, size).moved(1.0, Vec3::zeros(), Vec3::repeat(-0.5 * size));
+        let first = vertices.len() as u32;
+        vertices.extend(cube.vertices);
+        triangles.extend(cube.triangles.iter().map(|corners| corners.map(|corner| corner + first)));
+    }
+    let fit = Closed { vertices, triangles }.fit(Primitive::Point, 1);
+    assert!(fit.skeletons[0].radius - fit.skeletons[0].thickness <= fit.diagonal * (1.0 + 1e-12));
+}
+
+#[test]
 fn one_point_finds_a_ball() {
     for (at, radius) in [(Vec3::zeros(), 1.0), (Vec3::new(3.0, -2.0, 5.0), 0.02)] {
         // The edges of the mesh lie a little within the ball.

@@ -1,7 +1,8 @@
 /*
- * A mesh in, a coat out: a closed mesh of triangles becomes a body of points, which falls on a floor. The mesh is that of a ring, or of the Wavefront file (.obj, triangles alone) that is the first argument. With a
- * folder as another argument it leaves pictures there; --record FILE records the fall. Exits 0 when the coat of
- * the ring is within 0.5 % of the diagonal from the mesh on average, and the floor holds it.
+ * A mesh in, a coat out: a closed mesh of triangles becomes a body of points, which falls on a floor. The mesh is that of
+ * a ring, or of the Wavefront file (.obj, triangles alone) that is the first argument. With a folder as another argument
+ * it leaves pictures there; --record FILE records the fall. Exits 0 when the coat of the ring is within 0.5 % of the
+ * diagonal from the mesh on average, and the floor holds it.
  */
 #include <isocoat/isocoat.h>
 

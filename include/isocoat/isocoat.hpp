@@ -16,6 +16,7 @@
 #ifndef ISOCOAT_HPP
 #define ISOCOAT_HPP
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -212,14 +213,16 @@ inline fitted_coat fit_mesh(const isocoat_fit_desc &desc, span<const vec3> verti
     if (weights.size() != bones.size() || influences * vertices.size() != bones.size())
         throw std::invalid_argument("bones and weights must be as many, and as many of each vertex");
     fitted_coat coat;
-    coat.skeletons.assign(desc.count, isocoat_skeleton_desc_default());
-    coat.bones.resize(desc.count);
+    /* More than there may be are refused below. */
+    const std::size_t capacity = std::min<std::size_t>(desc.count, 4096);
+    coat.skeletons.assign(capacity, isocoat_skeleton_desc_default());
+    coat.bones.resize(capacity);
     /* There is always a place to point at, so that a count of 0 is refused as what it is. */
     isocoat_skeleton_desc none = isocoat_skeleton_desc_default();
     check(isocoat_fit_mesh(&desc, source(vertices.empty() ? nullptr : vertices.data()->data()), vertices.size(),
                            triangles.empty() ? nullptr : triangles.data()->data(), triangles.size(),
                            bones.empty() ? nullptr : bones.data(), source(weights.data()), influences,
-                           coat.skeletons.empty() ? &none : coat.skeletons.data(), coat.bones.data(), desc.count,
+                           coat.skeletons.empty() ? &none : coat.skeletons.data(), coat.bones.data(), capacity,
                            &coat.distance));
     return coat;
 }
@@ -545,7 +548,6 @@ public:
         desc.deformation = deformation;
         check(isocoat_body_make_mesh(world_, raw_, &desc, out.get()));
     }
-    /* Binds a mesh of the host to it, at the present poses; without normals it has the coat's. */
     /* The skeletons of a fitted coat, each on the link of its bone; frame: the mesh's in the world, with the links where
        they are now. */
     std::vector<skeleton> create_fitted(const fitted_coat &coat, span<const link> links, const isocoat::pose &frame)
@@ -557,6 +559,7 @@ public:
                                            made.size(), &frame, made.data()));
         return detail::name<skeleton>(world_, made);
     }
+    /* Binds a mesh of the host to it, at the present poses; without normals it has the coat's. */
     skin create_skin(isocoat_const_buffer vertices, isocoat_const_buffer normals, std::size_t count)
     {
         return {world_, detail::read(isocoat_skin{}, isocoat_skin_create, world_, raw_, vertices, normals, count)};

@@ -12,6 +12,7 @@ use super::pointer::{Out, slice, slice_mut};
 use super::skeleton::{ISOCOAT_SHAPE_POINT, ISOCOAT_SHAPE_SEGMENT, isocoat_shape, isocoat_skeleton_desc};
 use super::status::{Checked, Refusal, isocoat_status};
 use super::world::check_reserved;
+use crate::surface::fit::check_count;
 use crate::world::fit::{Bones, FitDesc, Primitive, fit};
 
 /// What coat is fitted to a mesh. Begin with isocoat_fit_desc_default().
@@ -98,12 +99,12 @@ pub unsafe extern "C" fn isocoat_fit_desc_init(desc: *mut isocoat_fit_desc, size
 /// - triangle_count: number of triangles, at least 4.
 /// - bones: numbers of the bones that move each vertex, bones_per_vertex of each in a row; NULL if there is one bone
 ///   alone. A skeleton then belongs to the bone with the most weight where it lies, and each bone that has a part of the
-///   surface gets as many as it needs to be as close as the others, one at least.
+///   surface gets as many as it needs to be as close as the others: one at least if that is more than 1/2000 of it.
 /// - weights: 1 number for each of these, at least 0, not all of a vertex 0; its data not NULL unless bones is.
 /// - bones_per_vertex: at least 1 unless bones is NULL.
 /// - skeletons: receives desc->count descriptors in the frame of the mesh: shape, thickness, radius, and defaults. Not
 ///   NULL; the first must have its struct_size set, and says how far they are apart.
-/// - skeleton_bones: receives the bone of each, 0 without bones; NULL if not wanted.
+/// - skeleton_bones: receives the bone of each, 0 without bones; NULL if not wanted. Not the array of bones.
 /// - capacity: skeletons that fit into each of the two.
 /// - distance: receives how close the surface comes; NULL if not wanted.
 ///
@@ -139,7 +140,7 @@ pub unsafe extern "C" fn isocoat_fit_mesh(
             let out = OutRow::new(skeletons, capacity, "skeletons")?;
             let out_bones = slice_mut(skeleton_bones, capacity, "skeleton_bones")?;
             let distance = if distance.is_null() { None } else { Some(Out::new(distance, "distance")?) };
-            fits("capacity", capacity, desc.count as usize)?;
+            fits("capacity", capacity, check_count(desc.count)?)?;
 
             let vertices: Vec<[f64; 3]> = vertices.iter().collect();
             let weights: Vec<f64> = weights.iter().map(|[weight]| weight).collect();

@@ -145,7 +145,7 @@ pub fn move_offsets(parts: &mut [Part], losses: &[Loss], gain: f64) -> bool {
             let next = wanted
                 .clamp(-STRIDE * thickness, STRIDE * thickness)
                 .clamp(OFFSETS.0 * thickness - offset, OFFSETS.1 * thickness - offset);
-            held_back |= wanted.abs() > STRIDE * thickness;
+            held_back |= next.abs() >= STRIDE * thickness;
             moved = moved.max((next - change).abs() / thickness);
             parts[index].change = next;
         }

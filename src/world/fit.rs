@@ -50,7 +50,7 @@ pub struct Fit {
 /// - `vertices`: where \[m\]. Several at one place count as one, so that a mesh may be split along seams.
 /// - `triangles`: three vertices each, counterclockwise from outside. Each edge lies between two triangles.
 /// - `bones`: whose the vertices are. A skeleton then belongs to the bone with the most weight where it lies, and each bone
-///   that has a part of the surface gets as many as it needs to be as close as the others.
+///   that has more than 1/2000 of the surface gets as many as it needs to be as close as the others.
 ///
 /// # Errors
 ///

@@ -34,7 +34,9 @@ def rows_of(text):
 
 def run(command):
     """What a program prints; its lines appear on the screen too."""
-    process = subprocess.Popen([str(word) for word in command], stdout=subprocess.PIPE, text=True)
+    # splashsurf, told to use one thread, still has some of its work done by all of the pool's.
+    alone = {**os.environ, "RAYON_NUM_THREADS": "1"}
+    process = subprocess.Popen([str(word) for word in command], stdout=subprocess.PIPE, text=True, env=alone)
     lines = []
     for line in process.stdout:
         print("  " + line, end="", flush=True)

@@ -12,6 +12,8 @@ use crate::surface::mesh::{self, Mesh};
 const POINTS: usize = 20_000;
 /// Largest edge of the cells of the coat's mesh.
 const CELL: f64 = 1.0 / 256.0;
+/// The finest cells: finer ones would be too many.
+const FINEST: f64 = 1.0 / 700.0;
 
 /// Distance of two surfaces, measured from either to the other.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,7 +61,7 @@ impl Mesher {
 /// Distance of a target and a coat in its frame, which has nothing thinner than `finest`: infinite if it has no surface.
 pub fn distance(target: &Target, coat: Coat, finest: f64) -> Result<Distance> {
     let mut mesher = Mesher::default();
-    mesher.make(coat, finest.min(CELL))?;
+    mesher.make(coat, finest.clamp(FINEST, CELL))?;
     let soup = Soup::new(mesher.mesh.triangles.iter().map(|triangle| mesher.corners(triangle)));
     let to_coat = |p: &Vec3| soup.nearest(p).map_or(f64::INFINITY, |(_, distance)| distance);
     let samples = target.samples(POINTS);

@@ -56,14 +56,17 @@ pub struct Settings {
     pub width: f64,
 }
 
+/// Whether a fit may have so many skeletons.
+pub fn check_count(count: u32) -> Result<usize> {
+    let count = count as usize;
+    if (1..=MOST).contains(&count) { Ok(count) } else { Err(out_of_range("count", count, "from 1 to 4096")) }
+}
+
 impl Settings {
     /// Checks what is wanted of a target: `width` in metres, or 0 for one that goes with the number of skeletons.
     pub fn new(target: &Target, primitive: Primitive, count: u32, width: f64) -> Result<Self> {
-        let count = count as usize;
-        if !(1..=MOST).contains(&count) {
-            return Err(out_of_range("count", count, "from 1 to 4096"));
-        }
-        let own = WIDTH * (target.area / count as f64).sqrt();
+        let count = check_count(count)?;
+        let own = (WIDTH * (target.area / count as f64).sqrt()).min(1.0);
         let relative = width / target.diagonal;
         require("width over the diagonal of the mesh", relative, "0, or from 1e-3 to 1", |x| {
             x == 0.0 || (1e-3..=1.0).contains(&x)

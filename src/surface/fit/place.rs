@@ -6,12 +6,18 @@
 //! the smallest with which so many balls cover all.
 
 use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+use std::collections::{BTreeSet, BinaryHeap};
 
 use super::refine::Fitted;
 use super::target::{Sample, Target};
 use crate::math::{Mat3, Vec3};
 use crate::surface::tree::Tree;
+
+/// Difference below which two balls are alike.
+const ALIKE: f64 = 1e-4;
+
+/// How much the distance from where other balls were grown counts, beside a gap.
+const SPREAD: f64 = 0.05;
 
 /// Halvings of the margin.
 const HALVINGS: u32 = 8;
@@ -54,29 +60,59 @@ fn inscribed(target: &Target, sample: &Sample) -> Ball {
     Ball { center, radius, bone: sample.bone }
 }
 
-/// Balls that cover the points, by their numbers; `None` if more than `most` were needed.
-fn cover(lists: &[Vec<u32>], points: usize, most: usize) -> Option<Vec<usize>> {
-    let mut covered = vec![false; points];
-    let mut left = points;
-    // What a ball covers that is not covered yet only shrinks: who leads with its present number is the best.
-    let mut heap: BinaryHeap<(usize, Reverse<usize>)> =
-        lists.iter().enumerate().map(|(ball, list)| (list.len(), Reverse(ball))).collect();
-    let mut taken = Vec::new();
-    while left > 0 {
-        let (count, Reverse(ball)) = heap.pop()?;
-        let now = lists[ball].iter().filter(|point| !covered[**point as usize]).count();
-        if now < count {
-            heap.push((now, Reverse(ball)));
-            continue;
-        }
-        if taken.len() == most {
-            return None;
-        }
-        taken.push(ball);
-        left -= now;
-        lists[ball].iter().for_each(|point| covered[*point as usize] = true);
+/// The points that balls cover within a margin. Not kept: of a mesh that is nearly round each ball covers nearly all.
+struct Covering<'a> {
+    samples: &'a [Sample],
+    tree: Tree,
+    balls: &'a [Ball],
+}
+
+impl Covering<'_> {
+    fn visit(&self, ball: usize, margin: f64, mut see: impl FnMut(usize)) {
+        let ball = &self.balls[ball];
+        let reach = ball.radius + margin;
+        self.tree.near(&ball.center, reach, |number| {
+            let sample = &self.samples[number as usize];
+            if sample.bone == ball.bone && (sample.point - ball.center).norm() <= reach {
+                see(number as usize);
+            }
+        });
     }
-    Some(taken)
+
+    /// Of these balls, some that cover all points; `None` if more than `most` were needed.
+    fn cover(&self, margin: f64, among: &[usize], most: usize) -> Option<Vec<usize>> {
+        let mut covered = vec![false; self.samples.len()];
+        let mut left = covered.len();
+        // What a ball covers that is not covered yet only shrinks: who leads with its present number is the best.
+        let mut heap: BinaryHeap<(usize, Reverse<usize>)> = among.iter().map(|ball| (left, Reverse(*ball))).collect();
+        let mut taken = Vec::new();
+        while left > 0 {
+            let (count, Reverse(ball)) = heap.pop()?;
+            let mut now = 0;
+            self.visit(ball, margin, |point| now += usize::from(!covered[point]));
+            if now < count {
+                heap.push((now, Reverse(ball)));
+                continue;
+            }
+            if taken.len() == most {
+                return None;
+            }
+            taken.push(ball);
+            left -= now;
+            self.visit(ball, margin, |point| covered[point] = true);
+        }
+        Some(taken)
+    }
+}
+
+/// One of each number of balls that are alike, by their places: the first.
+fn distinct(balls: &[Ball]) -> Vec<usize> {
+    let key = |ball: &Ball| {
+        let [x, y, z] = [ball.center.x, ball.center.y, ball.center.z].map(|x| (x / ALIKE).round() as i64);
+        (x, y, z, (ball.radius / ALIKE).round() as i64, ball.bone)
+    };
+    let mut seen = BTreeSet::new();
+    (0..balls.len()).filter(|ball| seen.insert(key(&balls[*ball]))).collect()
 }
 
 /// So many balls that cover the surface within the smallest margin, each what is of its bone. At least as many as there
@@ -85,21 +121,8 @@ pub fn balls(target: &Target, samples: &[Sample], count: usize) -> Vec<Ball> {
     let all: Vec<Ball> = samples.iter().map(|sample| inscribed(target, sample)).collect();
     let mut tree = Tree::default();
     tree.build(samples.iter().map(|sample| (sample.point, sample.point)));
-    let lists = |margin: f64| -> Vec<Vec<u32>> {
-        let list = |ball: &Ball| {
-            let mut list = Vec::new();
-            let reach = ball.radius + margin;
-            tree.near(&ball.center, reach, |number| {
-                let sample = &samples[number as usize];
-                if sample.bone == ball.bone && (sample.point - ball.center).norm() <= reach {
-                    list.push(number);
-                }
-            });
-            list
-        };
-        all.iter().map(list).collect()
-    };
-    let covers = |margin: f64| cover(&lists(margin), samples.len(), count);
+    let (covering, among) = (Covering { samples, tree, balls: &all }, distinct(&all));
+    let covers = |margin: f64| covering.cover(margin, &among, count);
     // Within the diagonal, one ball covers all of its bone.
     let (mut low, mut high) = (0.0, (0.25 * (target.area / count as f64).sqrt()).min(1.0));
     let mut taken = covers(high);
@@ -114,15 +137,28 @@ pub fn balls(target: &Target, samples: &[Sample], count: usize) -> Vec<Ball> {
             None => low = middle,
         }
     }
-    let mut chosen: Vec<Ball> = taken.unwrap_or_default().into_iter().map(|ball| all[ball]).collect();
-    // What is left goes where the surface is farthest from all so far.
-    let away = |ball: &Ball, sample: &Sample| (sample.point - ball.center).norm() - ball.radius;
-    let nearest = |sample: &Sample| chosen.iter().map(|ball| away(ball, sample)).fold(f64::INFINITY, f64::min);
-    let mut gaps: Vec<f64> = samples.iter().map(nearest).collect();
+    let taken = taken.unwrap_or_default();
+    let mut chosen: Vec<Ball> = taken.iter().map(|ball| all[*ball]).collect();
+    // What is left goes where the surface is farthest from all so far, and from where they were grown.
+    let away = |ball: &Ball, sample: &Sample| ((sample.point - ball.center).norm() - ball.radius).max(0.0);
+    let apart = |from: usize, sample: &Sample| (sample.point - samples[from].point).norm();
+    let least = |of: &dyn Fn(usize) -> f64| taken.iter().map(|ball| of(*ball)).fold(f64::INFINITY, f64::min);
+    let gap = |sample: &Sample| (least(&|ball| away(&all[ball], sample)), least(&|ball| apart(ball, sample)));
+    let mut gaps: Vec<(f64, f64)> = samples.iter().map(gap).collect();
     while chosen.len() < count {
-        let farthest = (0..gaps.len()).max_by(|a, b| gaps[*a].total_cmp(&gaps[*b]).then(b.cmp(a)));
-        let ball = all[farthest.expect("there are points")];
-        gaps.iter_mut().zip(samples).for_each(|(gap, sample)| *gap = gap.min(away(&ball, sample)));
+        let score = |at: usize| gaps[at].0 + SPREAD * gaps[at].1;
+        let farthest = (0..gaps.len()).max_by(|a, b| score(*a).total_cmp(&score(*b)).then(b.cmp(a)));
+        let at = farthest.expect("there are points");
+        let mut ball = all[at];
+        // Two in one place could never be told apart: a smaller one that touches at the same point.
+        let is_like = |other: &Ball| (other.center - ball.center).norm() < 0.1 * ball.radius;
+        if chosen.iter().any(is_like) {
+            ball.radius *= 0.5;
+            ball.center = samples[at].point - samples[at].normal * ball.radius;
+        }
+        for (gap, sample) in gaps.iter_mut().zip(samples) {
+            *gap = (gap.0.min(away(&ball, sample)), gap.1.min(apart(at, sample)));
+        }
         chosen.push(ball);
     }
     chosen

@@ -72,7 +72,7 @@ impl Rows {
     }
 
     /// The solution in `x` of the least squares of the rows and of `damping` times the diagonal \[Marquardt 1963\], by at
-    /// most so many steps of conjugate gradients. `floor`: least that a number of the diagonal counts.
+    /// most so many steps of conjugate gradients.
     pub fn solve(&self, damping: f64, most: usize, tolerance: f64, x: &mut Vec<f64>, columns: usize) {
         let size = columns * self.width;
         let mut diagonal = vec![0.0; size];

@@ -135,7 +135,9 @@ impl Target {
         let mut tips = vec![Vec3::zeros(); vertices.len()];
         for face in &mut faces {
             for (k, corner) in face.vertices.iter().enumerate() {
-                let to = |other: usize| (face.corners[(k + other) % 3] - face.corners[k]).normalize();
+                // Corners may have come to the same place.
+                let away = |other: usize| face.corners[(k + other) % 3] - face.corners[k];
+                let to = |other: usize| away(other).try_normalize(0.0).unwrap_or_default();
                 let angle = libm::acos(to(1).dot(&to(2)).clamp(-1.0, 1.0));
                 tips[*corner as usize] += face.normal * angle;
             }
@@ -167,7 +169,10 @@ impl Target {
             [true, false, true] => face.edges[2],
             _ => face.normal,
         };
-        let outward = outward.try_normalize(1e-9).unwrap_or(face.normal);
+        // A triangle without area has no normal: those around it tell.
+        let around = || face.edges.iter().sum::<Vec3>().try_normalize(1e-9).unwrap_or_default();
+        let own = || if face.normal == Vec3::zeros() { around() } else { face.normal };
+        let outward = outward.try_normalize(1e-9).unwrap_or_else(own);
         let distance = if (p - point).dot(&outward) < 0.0 { -distance } else { distance };
         Foot { point, distance, outward, bone: self.bone(face, shares) }
     }
