@@ -269,7 +269,7 @@ static void what_makes_no_sense_is_refused_and_changes_nothing(void)
     REFUSED(isocoat_substance_fill_ball(world, body, low, 0.0, &fill), range, "radius of a ball to fill is 0");
     REFUSED(isocoat_substance_fill_ball(world, body, low, 1e4, &fill), ISOCOAT_ERROR_CAPACITY, "1048576");
     REFUSED(isocoat_substance_fill_ball(world, body, NULL, 1.0, &fill), argument, "center is NULL");
-    REFUSED(isocoat_substance_fill_mesh(world, body, vertices[0], 4, outside, 1, &fill), range, "is 4; must be less than");
+    REFUSED(isocoat_substance_fill_mesh(world, body, vertices[0], 4, outside, 1, &fill), range, "is 4; must be below");
     REFUSED(isocoat_substance_fill_mesh(world, body, vertices[0], 4, NULL, 0, &fill), unsupported, "no triangles");
     REFUSED(isocoat_substance_fill_mesh(world, body, NULL, 4, triangles[0], 4, &fill), argument, "vertices is NULL");
     REFUSED(isocoat_substance_fill_mesh(world, body, vertices[0], 4, NULL, 4, &fill), argument, "triangles is NULL");

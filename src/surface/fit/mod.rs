@@ -25,8 +25,7 @@ pub use target::{Bones, Target};
 /// Most skeletons of a fit.
 pub const MOST: usize = 4096;
 
-/// The width over the side of a square that holds a skeleton's share of the surface: of widths between 0.2 and 0.7 the one
-/// that brings the mesh of a bunny closest.
+/// The width over the side of a square that holds a skeleton's share of the surface (`make fit` has others beside it).
 const WIDTH: f64 = 0.3;
 /// Smallest thickness over the width: the radius is at most four times the thickness.
 const THINNEST: f64 = 1.0 / 3.0;

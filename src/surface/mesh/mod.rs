@@ -90,7 +90,7 @@ pub fn bounds(vertices: &[[f64; 3]], triangles: &[[u32; 3]]) -> Result<(Vec3, Ve
     }
     let most = triangles.iter().flatten().copied().max().ok_or(Error::Unsupported("the mesh has no triangles"))?;
     if most as usize >= vertices.len() {
-        return Err(out_of_range("corner of a triangle of the mesh", most, "less than the number of vertices"));
+        return Err(out_of_range("corner of a triangle of the mesh", most, "below the number of vertices"));
     }
     let empty = (Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY));
     let corners = triangles.iter().flatten().map(|corner| Vec3::from(vertices[*corner as usize]));
