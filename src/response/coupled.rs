@@ -8,7 +8,7 @@ use nalgebra::{Matrix6, Vector6};
 
 use super::conjugate::{Block, Blocks};
 use super::envelope::{BLOCK, Envelope};
-use super::group::{Group, Member, Point, Push, Slope};
+use super::group::{Group, Member, Points, Push, Slope};
 use super::grouping::Bundle;
 use super::springs::Tie;
 use crate::base::{Inertia, Motion};
@@ -21,7 +21,7 @@ pub struct Coupled {
     /// All groups.
     pub groups: Vec<Group>,
     /// Points of all groups.
-    pub points: Vec<Point>,
+    pub points: Points,
     /// Springs.
     pub ties: Vec<Tie>,
     /// Members of all groups, then of all ties.
@@ -140,7 +140,7 @@ impl Coupled {
             members: behind(group.members, members),
             ..*group
         }));
-        self.points.extend_from_slice(&bundle.points);
+        self.points.append(&bundle.points);
         self.members.extend_from_slice(&bundle.members);
     }
 
@@ -359,12 +359,7 @@ impl Coupled {
         team.each_mut(&mut parts, team.share(count, GROUPS), |index, part| match self.groups.get(index) {
             Some(group) => {
                 let relative = self.relative_of(group.members, x, fixed);
-                part.push = group.respond(
-                    &self.points[group.points.0..group.points.1],
-                    &relative,
-                    h,
-                    with_matrix.then_some(&mut part.slope),
-                );
+                part.push = group.respond(&self.points, &relative, h, with_matrix.then_some(&mut part.slope));
                 part.resists = part.push.all != Wrench::default();
             }
             None => {

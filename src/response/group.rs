@@ -7,7 +7,9 @@
 
 use nalgebra::Matrix6;
 
+use crate::contact::patch::Node;
 use crate::contact::press::Material;
+use crate::field::lanes::{Dispatch, Kernel, Lanes};
 use crate::math::{Mat3, Twist, Vec3, Wrench};
 
 /// A point of a contact.
@@ -23,6 +25,100 @@ pub struct Point {
     pub stiffness: f64,
     /// Its area \[m²\].
     pub area: f64,
+}
+
+/// Points that are worked on side by side: always as many, so that sums are the same in registers of any width.
+const LANES: usize = 8;
+
+/// Points of many groups, each figure in a row of its own. Behind a group of more than one come points without a load,
+/// to a multiple of [`LANES`].
+#[derive(Debug, Default)]
+pub struct Points {
+    arm: [Vec<f64>; 3],
+    normal: [Vec<f64>; 3],
+    load: Vec<f64>,
+    stiffness: Vec<f64>,
+    area: Vec<f64>,
+}
+
+impl Points {
+    fn rows_mut(&mut self) -> [&mut Vec<f64>; 9] {
+        let Self { arm: [x, y, z], normal: [u, v, w], load, stiffness, area } = self;
+        [x, y, z, u, v, w, load, stiffness, area]
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.load.len()
+    }
+
+    /// Forgets them.
+    pub fn clear(&mut self) {
+        for row in self.rows_mut() {
+            row.clear();
+        }
+    }
+
+    /// Adds a point.
+    pub fn push(&mut self, Point { arm, normal, load, stiffness, area }: &Point) {
+        let figures = [arm.x, arm.y, arm.z, normal.x, normal.y, normal.z, *load, *stiffness, *area];
+        for (row, figure) in self.rows_mut().into_iter().zip(figures) {
+            row.push(figure);
+        }
+    }
+
+    /// Adds nodes, and gives their centre of pressure, from which their arms go.
+    pub fn extend<'a>(&mut self, nodes: impl Iterator<Item = &'a Node>) -> Vec3 {
+        let first = self.len();
+        let mut center = Vec3::zeros();
+        for node in nodes {
+            let load = node.force.norm();
+            center += node.position * load;
+            let (arm, normal, stiffness, area) = (node.position, node.force / load, node.stiffness, node.area);
+            self.push(&Point { arm, normal, load, stiffness, area });
+        }
+        center /= self.load[first..].iter().sum::<f64>();
+        for (row, center) in self.arm.iter_mut().zip(center.iter()) {
+            row[first..].iter_mut().for_each(|arm| *arm -= center);
+        }
+        let count = self.len() - first;
+        if count > 1 {
+            let end = first + count.next_multiple_of(LANES);
+            for row in self.rows_mut() {
+                row.resize(end, 0.0);
+            }
+        }
+        center
+    }
+
+    /// Adds the points of another.
+    pub fn append(&mut self, others: &Self) {
+        for (axis, row) in self.arm.iter_mut().enumerate() {
+            row.extend_from_slice(&others.arm[axis]);
+        }
+        for (axis, row) in self.normal.iter_mut().enumerate() {
+            row.extend_from_slice(&others.normal[axis]);
+        }
+        self.load.extend_from_slice(&others.load);
+        self.stiffness.extend_from_slice(&others.stiffness);
+        self.area.extend_from_slice(&others.area);
+    }
+
+    /// One of them.
+    pub fn get(&self, index: usize) -> Point {
+        Point {
+            arm: Vec3::from(self.arm.each_ref().map(|row| row[index])),
+            normal: Vec3::from(self.normal.each_ref().map(|row| row[index])),
+            load: self.load[index],
+            stiffness: self.stiffness[index],
+            area: self.area[index],
+        }
+    }
+
+    /// Areas and stiffnesses of some, added up.
+    pub fn sums(&self, (first, end): (usize, usize)) -> (f64, f64) {
+        (self.area[first..end].iter().sum(), self.stiffness[first..end].iter().sum())
+    }
 }
 
 /// A link that carries a group of points.
@@ -101,25 +197,6 @@ pub struct Slope {
     pub aa: Mat3,
 }
 
-impl Slope {
-    /// Adds what resists motion along `direction` at `arm`: as much force as motion there, `factor` times.
-    fn add_along(&mut self, direction: &Vec3, arm: &Vec3, factor: f64) {
-        let lever = arm.cross(direction);
-        let (scaled, scaled_lever) = (direction * factor, lever * factor);
-        self.ll += direction * scaled.transpose();
-        self.la += direction * scaled_lever.transpose();
-        self.aa += lever * scaled_lever.transpose();
-    }
-
-    /// Adds what resists all motion at `arm`.
-    fn add_all(&mut self, arm: &Vec3, factor: f64) {
-        let moment = arm * factor;
-        self.ll += Mat3::from_diagonal_element(factor);
-        self.la -= moment.cross_matrix();
-        self.aa += Mat3::from_diagonal_element(arm.dot(&moment)) - arm * moment.transpose();
-    }
-}
-
 /// Dry friction of a group.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Grip {
@@ -159,69 +236,207 @@ pub struct Group {
 impl Group {
     /// What its points come to at a relative velocity; in `slope` minus the derivative by that velocity, without the
     /// part that would make it lopsided.
-    pub fn respond(&self, points: &[Point], relative: &Twist, h: f64, slope: Option<&mut Slope>) -> Push {
-        let Material { dissipation, viscous, .. } = self.material;
-        let grip = &self.grip;
-        let since = Twist { linear: relative.linear - self.base.linear, angular: relative.angular - self.base.angular };
-        let (mut normal_load, mut mean_normal) = (0.0, Vec3::zeros());
-        let mut push = Push::default();
-        let (mut sum, with_slope) = (Slope::default(), slope.is_some());
-        for point in points {
-            let Point { arm, normal, .. } = point;
-            let pressing = point.load - h * point.stiffness * normal.dot(&since.at(arm));
-            if pressing <= 0.0 {
-                continue;
-            }
-            let velocity = relative.at(arm);
-            let parting = normal.dot(&velocity);
-            let damping = (1.0 - dissipation * parting).max(0.0);
-            let drag = viscous * point.area;
-            let load = (pressing * damping - drag * parting).max(0.0);
-            let mut force = normal * load - (velocity - normal * parting) * drag;
-            push.pressing.add_force_at(&force, arm);
-            // What resists across, along, and less along the slip.
-            let mut across = 0.0;
-            if load > 0.0 {
-                let damped = if damping > 0.0 { pressing * dissipation } else { 0.0 };
-                across = h * point.stiffness * damping + damped + drag;
-            }
-            let mut along = drag;
-            if grip.coefficient > 0.0 && load > 0.0 {
-                normal_load += load;
-                mean_normal += normal * load;
-                let wanted = grip.slip + grip.spin.cross(arm);
-                let slip = velocity - wanted;
-                let slip = slip - normal * slip.dot(normal);
-                let speed2 = slip.norm_squared() + grip.creep * grip.creep;
-                let most = grip.coefficient * load / speed2.sqrt();
-                force -= slip * most;
-                if with_slope {
-                    along += most;
-                    sum.add_along(&slip, arm, -most / speed2);
-                }
-            }
-            push.all.add_force_at(&force, arm);
-            if with_slope {
-                sum.add_along(normal, arm, across - along);
-                if along > 0.0 {
-                    sum.add_all(arm, along);
-                }
-            }
-        }
-        if grip.radius > 0.0 && normal_load > 0.0 && mean_normal != Vec3::zeros() {
-            let axis = mean_normal.normalize();
-            let spin = (relative.angular - grip.spin).dot(&axis);
-            let creep = grip.creep / grip.radius;
-            let rate = (spin * spin + creep * creep).sqrt();
-            let most = grip.coefficient * normal_load * grip.radius;
-            push.all.torque -= axis * (most * spin / rate);
-            sum.aa += axis * axis.transpose() * (most / rate * (1.0 - (spin / rate).powi(2)));
+    pub fn respond(&self, points: &Points, relative: &Twist, h: f64, slope: Option<&mut Slope>) -> Push {
+        let question = Question { group: self, points, relative, h, with_slope: slope.is_some() };
+        let sums = if self.points.1 - self.points.0 == 1 {
+            let mut values = [[0.0]; COUNT];
+            question.answer(self.points.0, 1, &mut values);
+            values.map(|[value]| value)
+        } else {
+            Dispatch::best().run(question)
+        };
+        let vector = |first: usize| Vec3::from_column_slice(&sums[first..first + 3]);
+        let wrench = |first: usize| Wrench { force: vector(first), torque: vector(first + 3) };
+        let mut push = Push { all: wrench(ALL), pressing: wrench(PRESSING) };
+        let twist = self.torsion(relative, sums[LOAD], vector(NORMAL));
+        if let Some((torque, _)) = twist {
+            push.all.torque += torque;
         }
         if let Some(slope) = slope {
-            *slope = sum;
+            let symmetric = |first: usize| {
+                let [xx, xy, xz, yy, yz, zz] = std::array::from_fn(|entry| sums[first + entry]);
+                Mat3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
+            };
+            let la = Mat3::from_row_slice(&sums[AL..AL + 9]);
+            *slope = Slope { ll: symmetric(LL), la, aa: symmetric(AA) };
+            if let Some((_, along)) = twist {
+                slope.aa += along;
+            }
         }
         push
     }
+
+    /// Torque of the torsional friction of a patch that is one point, and its slope.
+    fn torsion(&self, relative: &Twist, load: f64, mean_normal: Vec3) -> Option<(Vec3, Mat3)> {
+        let grip = &self.grip;
+        if grip.radius <= 0.0 || load <= 0.0 || mean_normal == Vec3::zeros() {
+            return None;
+        }
+        let axis = mean_normal.normalize();
+        let spin = (relative.angular - grip.spin).dot(&axis);
+        let creep = grip.creep / grip.radius;
+        let rate = (spin * spin + creep * creep).sqrt();
+        let most = grip.coefficient * load * grip.radius;
+        let slope = axis * axis.transpose() * (most / rate * (1.0 - (spin / rate).powi(2)));
+        Some((-axis * (most * spin / rate), slope))
+    }
+}
+
+/// A question to a group.
+struct Question<'a> {
+    group: &'a Group,
+    points: &'a Points,
+    relative: &'a Twist,
+    h: f64,
+    with_slope: bool,
+}
+
+/// Points that are worked on in one go.
+const CHUNK: usize = 2 * LANES;
+
+// What is summed over the points of a group, in a list: where each begins.
+/// The wrench of what presses.
+const PRESSING: usize = 0;
+/// The whole wrench.
+const ALL: usize = PRESSING + 6;
+/// The load that rubs.
+const LOAD: usize = ALL + 6;
+/// Its normals, weighted with it.
+const NORMAL: usize = LOAD + 1;
+/// Minus the derivative of force by velocity: on and below the diagonal.
+const LL: usize = NORMAL + 3;
+/// Of torque by velocity: all of it.
+const AL: usize = LL + 6;
+/// Of torque by angular velocity: on and below the diagonal.
+const AA: usize = AL + 9;
+/// Length of the list.
+const COUNT: usize = AA + 6;
+
+impl Kernel for Question<'_> {
+    type Output = [f64; COUNT];
+
+    #[inline(always)]
+    fn run<const W: usize>(self) -> [f64; COUNT] {
+        let (first, end) = self.group.points;
+        let mut sums = [[0.0; LANES]; COUNT];
+        let mut values = [[0.0; CHUNK]; COUNT];
+        for first in (first..end).step_by(CHUNK) {
+            let count = CHUNK.min((end - first).next_multiple_of(LANES));
+            self.answer(first, count, &mut values);
+            let wanted = if self.with_slope { COUNT } else { LL };
+            for (sums, values) in sums[..wanted].iter_mut().zip(&values) {
+                for values in values[..count].chunks_exact(LANES) {
+                    for (sum, value) in sums.iter_mut().zip(values) {
+                        *sum += value;
+                    }
+                }
+            }
+        }
+        sums.map(|sums| Lanes(sums).sum())
+    }
+}
+
+impl Question<'_> {
+    /// What each of `count` points comes to.
+    #[inline(always)]
+    fn answer<const N: usize>(&self, first: usize, count: usize, values: &mut [[f64; N]; COUNT]) {
+        match (self.with_slope, self.group.grip.coefficient > 0.0) {
+            (false, false) => self.each::<N, false, false>(first, count, values),
+            (false, true) => self.each::<N, false, true>(first, count, values),
+            (true, false) => self.each::<N, true, false>(first, count, values),
+            (true, true) => self.each::<N, true, true>(first, count, values),
+        }
+    }
+
+    // Plain numbers point by point, without a branch: so the compiler works on many side by side.
+    #[inline(always)]
+    fn each<const N: usize, const SLOPE: bool, const FRICTION: bool>(
+        &self,
+        first: usize,
+        count: usize,
+        values: &mut [[f64; N]; COUNT],
+    ) {
+        let Self {
+            group: Group { material: Material { dissipation, viscous, .. }, grip, base, .. }, relative, h, ..
+        } = self;
+        let since = Twist { linear: relative.linear - base.linear, angular: relative.angular - base.angular };
+        let creep2 = grip.creep * grip.creep;
+        let count = count.min(N);
+        // Slices of one length, for which one check will do.
+        let Points { arm: [x, y, z], normal: [u, v, w], load, stiffness, area } = self.points;
+        let range = first..first + count;
+        let (x, y, z) = (&x[range.clone()], &y[range.clone()], &z[range.clone()]);
+        let (u, v, w) = (&u[range.clone()], &v[range.clone()], &w[range.clone()]);
+        let (load, stiffness, area) = (&load[range.clone()], &stiffness[range.clone()], &area[range]);
+        for i in 0..count {
+            let (arm, normal) = (Vec3::new(x[i], y[i], z[i]), Vec3::new(u[i], v[i], w[i]));
+            let pressing = load[i] - h * stiffness[i] * normal.dot(&since.at(&arm));
+            let presses = pressing > 0.0;
+            let velocity = relative.at(&arm);
+            let parting = normal.dot(&velocity);
+            let damping = larger(1.0 - dissipation * parting, 0.0);
+            let drag = if presses { viscous * area[i] } else { 0.0 };
+            let load = if presses { larger(pressing * damping - drag * parting, 0.0) } else { 0.0 };
+            let mut put = |at: usize, value: f64| values[at][i] = value;
+            let mut put_vector = |at: usize, value: Vec3| {
+                put(at, value.x);
+                put(at + 1, value.y);
+                put(at + 2, value.z);
+            };
+            let mut force = normal * load - (velocity - normal * parting) * drag;
+            put_vector(PRESSING, force);
+            put_vector(PRESSING + 3, arm.cross(&force));
+            // What resists across, along, and less along the slip.
+            let damped = if damping > 0.0 { pressing * dissipation } else { 0.0 };
+            let across = if load > 0.0 { h * stiffness[i] * damping + damped + drag } else { 0.0 };
+            let (mut along, mut slip, mut spared) = (drag, Vec3::zeros(), 0.0);
+            if FRICTION {
+                slip = velocity - grip.slip - grip.spin.cross(&arm);
+                slip -= normal * slip.dot(&normal);
+                let speed2 = slip.norm_squared() + creep2;
+                let most = grip.coefficient * load / speed2.sqrt();
+                force -= slip * most;
+                along += most;
+                spared = most / speed2;
+            }
+            put_vector(ALL, force);
+            put_vector(ALL + 3, arm.cross(&force));
+            put_vector(NORMAL, normal * load);
+            values[LOAD][i] = load;
+            if SLOPE {
+                let mut ll = normal * (normal * (across - along)).transpose();
+                if FRICTION {
+                    ll -= slip * (slip * spared).transpose();
+                }
+                ll += Mat3::from_diagonal_element(along);
+                // Torque by velocity; force by turn is its transpose.
+                // Torque by velocity, by columns and by rows; force by turn is its transpose.
+                let [a, b, c] = [arm.cross(&ll.column(0)), arm.cross(&ll.column(1)), arm.cross(&ll.column(2))];
+                let rows = [Vec3::new(a.x, b.x, c.x), Vec3::new(a.y, b.y, c.y), Vec3::new(a.z, b.z, c.z)];
+                let [d, e, f] = [arm.cross(&rows[0]), arm.cross(&rows[1]), arm.cross(&rows[2])];
+                let figures = [
+                    (LL, [ll.m11, ll.m21, ll.m31]),
+                    (LL + 3, [ll.m22, ll.m32, ll.m33]),
+                    (AL, [a.x, a.y, a.z]),
+                    (AL + 3, [b.x, b.y, b.z]),
+                    (AL + 6, [c.x, c.y, c.z]),
+                    (AA, [d.x, d.y, d.z]),
+                    (AA + 3, [e.y, e.z, f.z]),
+                ];
+                for (at, [x, y, z]) in figures {
+                    values[at][i] = x;
+                    values[at + 1][i] = y;
+                    values[at + 2][i] = z;
+                }
+            }
+        }
+    }
+}
+
+/// The larger of two numbers, by one instruction.
+#[inline(always)]
+fn larger(x: f64, y: f64) -> f64 {
+    if y > x { y } else { x }
 }
 
 /// What a group's points come to at some velocity.
@@ -231,4 +446,103 @@ pub struct Push {
     pub all: Wrench,
     /// The same without dry friction.
     pub pressing: Wrench,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const H: f64 = 1.0 / 60.0;
+
+    /// A patch of uneven points on a dome, of which some press at this velocity and others don't.
+    fn patch(count: usize, friction: f64) -> (Group, Points) {
+        let mut points = Points::default();
+        let node = |index: usize| {
+            let (x, y) = ((index as f64 * 1.3).sin() * 0.1, (index as f64 * 2.1).cos() * 0.1);
+            let normal = Vec3::new(x, y, 1.0).normalize();
+            Node {
+                position: Vec3::new(x, y, -0.5 * (x * x + y * y)),
+                force: normal * (1.0 + x),
+                area: 0.01,
+                stiffness: 400.0,
+            }
+        };
+        let nodes: Vec<Node> = (0..count).map(node).collect();
+        let center = points.extend(nodes.iter());
+        let group = Group {
+            candidate: 0,
+            patch: Some(0),
+            center,
+            points: (0, count),
+            members: (0, 0),
+            material: Material { dissipation: 0.4, viscous: 3.0, ..Material::default() },
+            grip: Grip { coefficient: friction, creep: 0.01, ..Grip::default() },
+            base: Twist { linear: Vec3::new(0.0, 0.01, 0.02), angular: Vec3::new(0.3, 0.0, 0.1) },
+        };
+        (group, points)
+    }
+
+    fn twist() -> Twist {
+        Twist { linear: Vec3::new(0.02, -0.03, 0.1), angular: Vec3::new(1.5, -0.7, 0.4) }
+    }
+
+    fn six(wrench: &Wrench) -> [f64; 6] {
+        let Wrench { force, torque } = wrench;
+        [force.x, force.y, force.z, torque.x, torque.y, torque.z]
+    }
+
+    #[test]
+    fn points_side_by_side_come_to_what_each_does_alone() {
+        for (count, friction) in [(2, 0.0), (8, 0.3), (25, 0.0), (25, 0.3), (40, 0.3)] {
+            let (group, points) = patch(count, friction);
+            let mut slope = Slope::default();
+            let push = group.respond(&points, &twist(), H, Some(&mut slope));
+            let (mut all, mut ll, mut aa) = ([0.0; 6], Mat3::zeros(), Mat3::zeros());
+            let mut pressing = 0;
+            for point in 0..count {
+                let mut alone = Slope::default();
+                let alone_push =
+                    Group { points: (point, point + 1), ..group }.respond(&points, &twist(), H, Some(&mut alone));
+                pressing += usize::from(alone_push.all != Wrench::default());
+                for (sum, x) in all.iter_mut().zip(six(&alone_push.all)) {
+                    *sum += x;
+                }
+                (ll, aa) = (ll + alone.ll, aa + alone.aa);
+            }
+            assert!(count < 25 || pressing > 0 && pressing < count, "{pressing} of {count} press");
+            for (x, sum) in six(&push.all).into_iter().zip(all) {
+                assert!((x - sum).abs() < 1e-12);
+            }
+            assert!((ll - slope.ll).norm() < 1e-11 && (aa - slope.aa).norm() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn without_friction_the_slope_is_the_derivative() {
+        let (group, points) = patch(25, 0.0);
+        let mut slope = Slope::default();
+        group.respond(&points, &twist(), H, Some(&mut slope));
+        for column in 0..6 {
+            let moved = |by: f64| {
+                let mut moved = twist();
+                if column < 3 {
+                    moved.linear[column] += by
+                } else {
+                    moved.angular[column - 3] += by
+                }
+                six(&group.respond(&points, &moved, H, None).all)
+            };
+            let (less, more) = (moved(-1e-6), moved(1e-6));
+            for row in 0..6 {
+                let measured = (less[row] - more[row]) / 2e-6;
+                let stated = match (row < 3, column < 3) {
+                    (true, true) => slope.ll[(row, column)],
+                    (true, false) => slope.la[(row, column - 3)],
+                    (false, true) => slope.la[(column, row - 3)],
+                    (false, false) => slope.aa[(row - 3, column - 3)],
+                };
+                assert!((measured - stated).abs() < 1e-6 * slope.ll.norm(), "{row} {column}: {measured} {stated}");
+            }
+        }
+    }
 }

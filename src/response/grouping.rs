@@ -1,7 +1,8 @@
 //! From contact surfaces to groups: what each candidate brings into the system of an
 //! [implicit step](super::implicit), as points that press and rub on the links that carry them.
 
-use super::group::{Grip, Group, Member, Point};
+use super::group::{Grip, Group, Member, Point, Points};
+use super::sharing::{Part, Sharing};
 use super::substep::PUSH_OUT;
 use crate::base::{Inertia, Motion};
 use crate::contact::candidate::Candidate;
@@ -27,10 +28,11 @@ pub struct Bundle {
     /// The groups; their ranges count from the beginning of the bundle.
     pub groups: Vec<Group>,
     /// Points of all groups.
-    pub points: Vec<Point>,
+    pub points: Points,
     /// Members of all groups.
     pub members: Vec<Member>,
     carriers: Carriers,
+    sharing: Sharing,
 }
 
 impl Bundle {
@@ -65,40 +67,12 @@ impl Grouping<'_> {
     pub fn add_all(&mut self) {
         let Candidate { pair, surface, .. } = self.candidate;
         let h = self.h;
-        let single = pair.a.only_link().is_some() && pair.b.only_link().is_some();
         for (number, patch) in surface.patches.iter().enumerate() {
             let nodes = &surface.nodes[patch.nodes.0..patch.nodes.1];
             let sums = patch::sum(nodes);
-            if sums.force == Vec3::zeros() {
-                continue;
-            }
-            let grip = self.grip(patch, &sums, nodes);
-            let members = single.then(|| self.members(&sums.center));
-            let first = self.bundle.points.len();
-            for node in nodes {
-                let load = node.force.norm();
-                if load <= 0.0 {
-                    continue;
-                }
-                let begin = self.bundle.points.len();
-                let center = if single { sums.center } else { node.position };
-                self.bundle.points.push(Point {
-                    arm: node.position - center,
-                    normal: node.force / load,
-                    load,
-                    stiffness: node.stiffness,
-                    area: node.area,
-                });
-                if !single {
-                    let members = self.members(&node.position);
-                    let mut grip = grip;
-                    grip.slip += grip.spin.cross(&(node.position - sums.center));
-                    self.add_group(Some(number), center, (begin, begin + 1), members, grip);
-                }
-            }
-            if let Some(members) = members {
-                let points = (first, self.bundle.points.len());
-                self.add_group(Some(number), sums.center, points, members, grip);
+            if sums.force != Vec3::zeros() {
+                let grip = self.grip(patch, &sums, nodes);
+                self.add_patch(number, nodes, &sums, &grip);
             }
         }
         // What must come apart, from where the step began.
@@ -125,6 +99,28 @@ impl Grouping<'_> {
                 self.add_gap([i, j], &approach, gap.max(0.0));
             }
         }
+    }
+
+    /// Adds the groups of a patch.
+    fn add_patch(&mut self, number: usize, nodes: &[Node], sums: &Sums, grip: &Grip) {
+        let Self { bundle, trial, candidate: Candidate { pair, material, .. }, index, .. } = self;
+        let Bundle { groups, points, members, sharing, .. } = &mut **bundle;
+        sharing.find(pair, nodes);
+        sharing.each_kind(nodes, |nodes, carriers| {
+            let (first_point, first_member) = (points.len(), members.len());
+            let center = points.extend(nodes);
+            members.extend(carriers.iter().map(|part| member(trial, pair, &center, *part)));
+            groups.push(Group {
+                candidate: *index,
+                patch: Some(number as u32),
+                center,
+                points: (first_point, points.len()),
+                members: (first_member, members.len()),
+                material: *material,
+                grip: Grip { slip: grip.slip + grip.spin.cross(&(center - sums.center)), ..*grip },
+                base: Twist::default(),
+            });
+        });
     }
 
     /// Dry friction of a patch.
@@ -155,46 +151,6 @@ impl Grouping<'_> {
         grip
     }
 
-    /// The links that carry a point; gives their range.
-    fn members(&mut self, position: &Vec3) -> (usize, usize) {
-        let pair = &self.candidate.pair;
-        let first = self.bundle.members.len();
-        self.bundle.carriers.find(pair, position);
-        let Bundle { carriers, members, .. } = &mut *self.bundle;
-        for (shares, sign) in [(&carriers.a, -1.0), (&carriers.b, 1.0)] {
-            for share in shares {
-                let motion = &self.trial[share.link as usize];
-                members.push(Member {
-                    link: share.link,
-                    weight: sign * share.weight,
-                    arm: position - (motion.center - pair.origin),
-                    turns: !matches!(motion.inertia, Inertia::Point { .. }),
-                });
-            }
-        }
-        (first, self.bundle.members.len())
-    }
-
-    fn add_group(
-        &mut self,
-        patch: Option<usize>,
-        center: Vec3,
-        points: (usize, usize),
-        members: (usize, usize),
-        grip: Grip,
-    ) {
-        self.bundle.groups.push(Group {
-            candidate: self.index,
-            patch: patch.map(|patch| patch as u32),
-            center,
-            points,
-            members,
-            material: if patch.is_some() { self.candidate.material } else { Material::default() },
-            grip,
-            base: Twist::default(),
-        });
-    }
-
     /// A gap that pushes once the velocities close it, as softly as a shallow contact would.
     fn add_gap(&mut self, [i, j]: [usize; 2], approach: &Approach, gap: f64) {
         let pair = &self.candidate.pair;
@@ -221,11 +177,34 @@ impl Grouping<'_> {
     }
 
     fn add_lone(&mut self, approach: &Approach, load: f64, stiffness: f64) {
-        let first = self.bundle.points.len();
-        self.bundle.points.push(Point { arm: Vec3::zeros(), normal: approach.direction, load, stiffness, area: 0.0 });
-        let members = self.members(&approach.meeting);
-        self.add_group(None, approach.meeting, (first, first + 1), members, Grip::default());
+        let Bundle { groups, points, members, carriers, .. } = &mut *self.bundle;
+        let (pair, center) = (&self.candidate.pair, approach.meeting);
+        let (first_point, first_member) = (points.len(), members.len());
+        points.push(&Point { arm: Vec3::zeros(), normal: approach.direction, load, stiffness, area: 0.0 });
+        carriers.find(pair, &center);
+        for (shares, sign) in [(&carriers.a, -1.0), (&carriers.b, 1.0)] {
+            members.extend(
+                shares.iter().map(|share| member(self.trial, pair, &center, (share.link, sign * share.weight))),
+            );
+        }
+        groups.push(Group {
+            candidate: self.index,
+            patch: None,
+            center,
+            points: (first_point, points.len()),
+            members: (first_member, members.len()),
+            material: Material::default(),
+            grip: Grip::default(),
+            base: Twist::default(),
+        });
     }
+}
+
+/// What a link that carries a point of a pair is to a group.
+fn member(trial: &[Motion], pair: &Pair, center: &Vec3, (link, weight): Part) -> Member {
+    let motion = &trial[link as usize];
+    let turns = !matches!(motion.inertia, Inertia::Point { .. });
+    Member { link, weight, arm: center - (motion.center - pair.origin), turns }
 }
 
 /// All pairs of skeletons of a pair.

@@ -8,7 +8,7 @@
 
 use super::coupled::{Coupled, put_twist, twist_of};
 use super::envelope::{BLOCK, OrderBuffers, narrow_order};
-use super::group::{Group, Member, Point, Push};
+use super::group::{Group, Member, Points, Push};
 use super::grouping::{Bundle, CREEP, Grouping, RECOVERY, combinations, thicknesses, thinner};
 use super::springs::{self, Tie};
 use super::substep::{Island, Step, bend_bristles, drift};
@@ -386,7 +386,7 @@ impl Solver {
             let speed = self.speed(group.members, motions, h);
             let Some(patch) = group.patch else {
                 // A wall or a gap is exact, until it begins to push where it did not.
-                let point = &self.coupled.points[group.points.0];
+                let point = self.coupled.points.get(group.points.0);
                 let closed = point.load - h * point.stiffness * point.normal.dot(&change.linear);
                 return point.load > 0.0 || closed <= 0.0 || change.linear.norm() <= NEGLIGIBLE * speed;
             };
@@ -418,8 +418,7 @@ impl Solver {
 
     /// Half the width of a group's patch.
     fn size(&self, group: &Group) -> f64 {
-        let points = &self.coupled.points[group.points.0..group.points.1];
-        (points.iter().map(|point| point.area).sum::<f64>() / std::f64::consts::PI).sqrt()
+        (self.coupled.points.sums(group.points).0 / std::f64::consts::PI).sqrt()
     }
 
     /// The speeds that are at work among some members in this step.
@@ -521,7 +520,7 @@ impl Solver {
 }
 
 /// What the groups of one patch come to, about their common centre of pressure.
-fn patch_sums<'a>(pushes: impl Iterator<Item = (&'a Group, &'a Push)> + Clone, points: &[Point]) -> Sums {
+fn patch_sums<'a>(pushes: impl Iterator<Item = (&'a Group, &'a Push)> + Clone, points: &Points) -> Sums {
     let mut sums = Sums::default();
     let mut load = 0.0;
     for (group, push) in pushes.clone() {
@@ -529,10 +528,9 @@ fn patch_sums<'a>(pushes: impl Iterator<Item = (&'a Group, &'a Push)> + Clone, p
         sums.center += group.center * size;
         load += size;
         sums.force += push.pressing.force;
-        for point in &points[group.points.0..group.points.1] {
-            sums.area += point.area;
-            sums.stiffness += point.stiffness;
-        }
+        let (area, stiffness) = points.sums(group.points);
+        sums.area += area;
+        sums.stiffness += stiffness;
     }
     if load > 0.0 {
         sums.center /= load;

@@ -8,6 +8,7 @@ pub mod group;
 pub mod grouping;
 pub mod implicit;
 pub mod mirror;
+pub mod sharing;
 pub mod springs;
 pub mod substep;
 pub mod substepped;
