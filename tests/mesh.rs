@@ -163,7 +163,7 @@ fn meshes_are_closed_manifolds_in_any_scene() {
     let [none, pressed, bulging] = worst;
     println!("{triangles} triangles in 600 meshes; vertices off the surface, of the least thickness, at most:");
     println!("{none:.1e} undeformed, {pressed:.1e} in contact, {bulging:.1e} with bulges");
-    assert!(none < 1e-3 && pressed < 1e-3, "{worst:?}");
+    assert!(worst.iter().all(|off| *off < 1e-3), "{worst:?}");
 }
 
 /// Volume of a body by columns through its field: knows nothing of meshes but where to look.
