@@ -1069,8 +1069,8 @@ isocoat_status isocoat_skeleton_create(isocoat_world *world,
  *   is in the frame of its own link.
  * - skeletons: receives count handles; NULL when they are not wanted.
  *
- * Errors: as isocoat_skeleton_create; OUT_OF_RANGE for a link_of too large or a frame that is none. Threads: changes
- * the world.
+ * Errors: as isocoat_skeleton_create, and the message says which element; OUT_OF_RANGE for a link_of too large or a
+ * frame that is none. Threads: changes the world.
  */
 ISOCOAT_MUST_USE
 isocoat_status isocoat_skeleton_create_many(isocoat_world *world,
