@@ -3,6 +3,7 @@
 //! This file holds the nouns and their life; [`step`] is the pipeline, [`query`] what can be asked in between.
 
 pub use crate::handle as arena;
+pub mod attributes;
 mod blend;
 mod bytes;
 mod check;
@@ -494,7 +495,6 @@ impl World {
         Ok(made)
     }
 
-    /// Adds a checked skeleton, and says to which body.
     /// A skeleton of [`World::create_skeletons`] in the frame of its link, checked; the frame of all is valid.
     pub(crate) fn place_skeleton(
         &self,
@@ -517,6 +517,7 @@ impl World {
         Ok((desc, profile))
     }
 
+    /// Adds a checked skeleton, and says to which body.
     fn add_skeleton(&mut self, link: LinkId, desc: SkeletonDesc, profile: Profile) -> Result<(SkeletonId, usize)> {
         let id = self.skeletons.insert(Skeleton {
             desc,
