@@ -195,7 +195,7 @@ fn rust_layouts() -> BTreeMap<&'static str, Layout> {
         rays::isocoat_ray_hits {
             struct_size, reserved, distances, positions, normals, bodies, links, skeletons,
         }
-        mesh::isocoat_mesh_desc { struct_size, deformation, cell_size }
+        mesh::isocoat_mesh_desc { struct_size, deformation, cell_size, attributes, reserved }
         mesh::isocoat_mesh_view { positions, normals, triangles, valid, vertex_count, triangle_count }
         fit::isocoat_fit_desc { struct_size, shape, count, reserved, width }
         fit::isocoat_fit_distance { mean, maximum, diagonal }

@@ -56,6 +56,14 @@ scene() {
             --eye 0.5,-1.6,0.9 --target 0,0,0.12 --width 1.0 --size 360x250
         show film dough dough-section.png --from 20 --to 200 --step 10 --cut 0,-1,0,0 \
             --eye 0,-1.6,0.25 --target 0,0,0.11 --width 0.75 --size 360x220 ;;
+    bowl)
+        record bowl "$examples/cpp/bowl"
+        show film bowl bowl.png --from 5 --step 5 \
+            --eye 0.42,-0.76,0.63 --target 0,0,0.23 --width 0.84 --size 320x300 ;;
+    fit)
+        record fit "$examples/fit"
+        show film fit fit.png --to 40 --step 2 --paint skeletons \
+            --eye 1.0,-2.2,1.2 --target 0,0,0.42 --width 1.7 --size 360x290 ;;
     walk)
         record walk "$examples/cpp/walk"
         show film walk walk.png --from 60 --to 320 --step 8 \
@@ -70,7 +78,7 @@ scene() {
     esac
 }
 
-[ $# -gt 0 ] || set -- collision clover skin muscle jelly dough walk character
+[ $# -gt 0 ] || set -- collision clover skin muscle jelly dough bowl fit walk character
 for name; do
     scene "$name"
 done

@@ -1,8 +1,8 @@
 // Dough runs into a bowl that Bullet moves: a rope of it falls beside the middle, tips the bowl, and comes to lie in it.
 //
-//     bowl [folder [particles]]
+//     bowl [folder [particles]] [--record FILE]
 //
-// With a folder it leaves pictures there. Exits with 0 when the dough is in the bowl and one piece, has its volume, and the
+// With a folder it leaves pictures there; --record FILE records it. Exits with 0 when the dough is in the bowl and one piece, has its volume, and the
 // bowl has rocked and not turned over.
 #include <algorithm>
 #include <chrono>
@@ -19,6 +19,7 @@
 #include <isocoat_bullet.hpp>
 
 #include "../common/picture.h"
+#include "../common/record.h"
 
 namespace {
 
@@ -196,8 +197,12 @@ private:
     double particle_mass() const { return 1000.0 * spacing * spacing * spacing / std::sqrt(2.0); }
 };
 
-int run(double count, const char *folder) {
+int run(double count, const char *folder, const char *record) {
     kitchen scene(count);
+    recording film;
+    if (record_begin(&film, record) || record_frame(&film, scene.coats.get(), 0.0)) {
+        return 1;
+    }
     std::printf("%zu particles, a bowl of %.2f m\n", scene.dough.particle_count(), scene.radius);
     std::printf("time [s]  in the bowl  pieces  tilt [deg]  volume [l]  sub-steps  frame [ms]\n");
     const int frames = 120;
@@ -212,6 +217,9 @@ int run(double count, const char *folder) {
         most = std::fmax(most, scene.tilt());
         slowest = std::fmax(slowest, took.count());
         total += took.count();
+        if (record_frame(&film, scene.coats.get(), i * frame)) {
+            return 1;
+        }
         if (i % 15 == 0) {
             std::printf("%8.2f %12.2f %7zu %11.1f %11.2f %10u %11.1f\n", i * frame, scene.inside(),
                         scene.dough.pieces().size(), scene.tilt(), 1e3 * volume, scene.coats.counters().substeps,
@@ -229,6 +237,9 @@ int run(double count, const char *folder) {
     if (!scene.coupler.last_error().empty()) {
         std::printf("%s\n", scene.coupler.last_error().c_str());
     }
+    if (record_end(&film)) {
+        return 1;
+    }
     const bool holds = scene.inside() > 0.98 && worst < 0.03 && most > 1.0 && most < 60.0;
     return holds && scene.coupler.last_error().empty() ? 0 : 1;
 }
@@ -237,7 +248,8 @@ int run(double count, const char *folder) {
 
 int main(int argc, char **argv) {
     try {
-        return run(argc > 2 ? std::atof(argv[2]) : 500.0, argc > 1 ? argv[1] : nullptr);
+        const char *record = record_argument(&argc, argv);
+        return run(argc > 2 ? std::atof(argv[2]) : 500.0, argc > 1 ? argv[1] : nullptr, record);
     } catch (const std::exception &error) {
         std::fprintf(stderr, "%s\n", error.what());
         return 1;

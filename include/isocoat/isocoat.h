@@ -1069,8 +1069,8 @@ isocoat_status isocoat_skeleton_create(isocoat_world *world,
  *   is in the frame of its own link.
  * - skeletons: receives count handles; NULL when they are not wanted.
  *
- * Errors: as isocoat_skeleton_create; OUT_OF_RANGE for a link_of too large or a frame that is none. Threads: changes
- * the world.
+ * Errors: as isocoat_skeleton_create, and the message says which element; OUT_OF_RANGE for a link_of too large or a
+ * frame that is none. Threads: changes the world.
  */
 ISOCOAT_MUST_USE
 isocoat_status isocoat_skeleton_create_many(isocoat_world *world,
@@ -2556,6 +2556,14 @@ isocoat_status isocoat_world_cast_rays(const isocoat_world *world,
  */
 typedef struct isocoat_mesh isocoat_mesh;
 
+/** What a mesh knows of its vertices besides: ISOCOAT_MESH_ flags, added up. */
+typedef uint32_t isocoat_mesh_attributes;
+
+/** Whose they are: see isocoat_mesh_get_weights(). */
+#define ISOCOAT_MESH_WEIGHTS 1u
+/** What presses there: see isocoat_mesh_get_pressures(). */
+#define ISOCOAT_MESH_PRESSURES 2u
+
 /** What mesh of a body is wanted. Begin with isocoat_mesh_desc_default(). */
 typedef struct isocoat_mesh_desc {
     /** Size of this struct in bytes, as the host knows it. */
@@ -2568,6 +2576,10 @@ typedef struct isocoat_mesh_desc {
      * Default 0, which must be replaced.
      */
     double cell_size;
+    /** What it is to know of its vertices besides: ISOCOAT_MESH_ flags, added up. Default 0, nothing. */
+    isocoat_mesh_attributes attributes;
+    /** Must be 0. */
+    uint32_t reserved;
 } isocoat_mesh_desc;
 
 /** How the territory of a skeleton is shown: an ISOCOAT_TERRITORY_ value. */
@@ -2628,11 +2640,12 @@ isocoat_status isocoat_mesh_destroy(isocoat_mesh *mesh);
 /**
  * Makes a watertight mesh of a body's surface, in place of what the mesh was: closed, each edge between two triangles,
  * oriented outwards, with the vertices on the surface; the same input gives the same bits. It is empty for a body
- * without enabled skeletons, and asks for no memory once the mesh has held one as large (of an undeformed body).
+ * without enabled skeletons, and asks for no memory once the mesh has held one as large (of an undeformed body, without
+ * attributes).
  *
  * - world: not NULL.
  * - body: the body; it may be disabled. None of its enabled skeletons may be a plane.
- * - desc: cell size and shape; not NULL.
+ * - desc: cell size, shape and attributes; not NULL.
  * - mesh: receives the mesh; not NULL. After an error it is as it was. Its views are void.
  *
  * Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE, UNSUPPORTED, CAPACITY for too small a cell size, LOCKED.
@@ -2672,6 +2685,40 @@ isocoat_status isocoat_skeleton_make_mesh(const isocoat_world *world,
  * Errors: INVALID_ARGUMENT, LOCKED. Threads: the mesh by this thread alone.
  */
 ISOCOAT_MUST_USE isocoat_status isocoat_mesh_get_view(const isocoat_mesh *mesh, isocoat_mesh_view *view);
+
+/**
+ * Whose the vertices of a mesh are, without copying it: for each the four skeletons whose fields are the strongest
+ * there, with their shares of what these make together, as far as a blend graph lets them count. For textures,
+ * materials and bones: the weights of a link are those of its skeletons.
+ *
+ * - mesh: not NULL. It must have been made by isocoat_body_make_mesh() with ISOCOAT_MESH_WEIGHTS, or it has none.
+ * - skeletons: receives a pointer to 4 handles a vertex, the strongest first; null handles where there are fewer, and
+ *   on a substance. NULL if the mesh has none. Not NULL itself.
+ * - weights: receives a pointer to 4 doubles a vertex, which add up to 1; 0 for null handles. NULL if the mesh has
+ *   none. Not NULL itself.
+ *
+ * Both point into the mesh (not to be freed), and stay valid until it is made again or destroyed.
+ *
+ * Errors: INVALID_ARGUMENT, LOCKED. Threads: the mesh by this thread alone.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_mesh_get_weights(const isocoat_mesh *mesh,
+                                        const isocoat_skeleton **skeletons,
+                                        const double **weights);
+
+/**
+ * What presses on the vertices of a mesh, without copying it: the elastic pressure of contacts, without friction and
+ * dissipation. It is that of the body's own coat, and of a rigid body that of the coat that presses on it; 0 where
+ * nothing presses. Of a deformable body it makes sense in the shapes ISOCOAT_DEFORMATION_CONTACT and _BULGES: its
+ * undeformed surface has no pressure yet.
+ *
+ * - mesh: not NULL. It must have been made by isocoat_body_make_mesh() with ISOCOAT_MESH_PRESSURES, or it has none.
+ * - pressures: receives a pointer to a double a vertex, in Pa, at least 0; it points into the mesh (not to be freed),
+ *   and stays valid until that is made again or destroyed. NULL if the mesh has none. Not NULL itself.
+ *
+ * Errors: INVALID_ARGUMENT, LOCKED. Threads: the mesh by this thread alone.
+ */
+ISOCOAT_MUST_USE isocoat_status isocoat_mesh_get_pressures(const isocoat_mesh *mesh, const double **pressures);
 
 /**
  * Copies a mesh into the host's own memory, strided and in either precision; isocoat_mesh_get_view() says how large it

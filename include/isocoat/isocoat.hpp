@@ -268,8 +268,35 @@ public:
         if (!list.empty()) check(isocoat_mesh_copy(get(), {}, {}, 0, list.front().data(), list.size()));
         return list;
     }
+    /* Of each vertex the four skeletons whose fields are the strongest, null where there are fewer, and their weights;
+     * of a mesh made with ISOCOAT_MESH_WEIGHTS, else none. */
+    std::vector<std::array<isocoat_skeleton, 4>> strongest() const
+    {
+        return fours(view().vertex_count, weights_view().first);
+    }
+    std::vector<std::array<double, 4>> weights() const { return fours(view().vertex_count, weights_view().second); }
+    /* The pressure of contacts on each vertex, in Pa; of a mesh made with ISOCOAT_MESH_PRESSURES, else none. */
+    std::vector<double> pressures() const
+    {
+        const double *first = nullptr;
+        check(isocoat_mesh_get_pressures(get(), &first));
+        return first ? std::vector<double>(first, first + view().vertex_count) : std::vector<double>();
+    }
 
 private:
+    std::pair<const isocoat_skeleton *, const double *> weights_view() const
+    {
+        std::pair<const isocoat_skeleton *, const double *> look{};
+        check(isocoat_mesh_get_weights(get(), &look.first, &look.second));
+        return look;
+    }
+    template <class T> static std::vector<std::array<T, 4>> fours(std::size_t count, const T *first)
+    {
+        std::vector<std::array<T, 4>> list(first ? count : 0);
+        for (std::size_t at = 0; at < list.size(); ++at) std::copy_n(first + 4 * at, 4, list[at].begin());
+        return list;
+    }
+
     struct destroyer {
         void operator()(isocoat_mesh *raw) const noexcept { isocoat_mesh_destroy(raw); }
     };
@@ -540,12 +567,15 @@ public:
         check(isocoat_body_closest_point_deformed(world_, raw_, point.data(), deformation, &closest, &found));
         return found ? std::optional<surface_point>(closest) : std::nullopt;
     }
-    /* A watertight mesh of its surface with cells of this edge, in place of what the mesh was. */
-    void make_mesh(mesh &out, double cell_size, isocoat_deformation deformation = ISOCOAT_DEFORMATION_NONE) const
+    /* A watertight mesh of its surface with cells of this edge, in place of what the mesh was; attributes:
+     * ISOCOAT_MESH_ flags, added up. */
+    void make_mesh(mesh &out, double cell_size, isocoat_deformation deformation = ISOCOAT_DEFORMATION_NONE,
+                   isocoat_mesh_attributes attributes = 0) const
     {
         isocoat_mesh_desc desc = isocoat_mesh_desc_default();
         desc.cell_size = cell_size;
         desc.deformation = deformation;
+        desc.attributes = attributes;
         check(isocoat_body_make_mesh(world_, raw_, &desc, out.get()));
     }
     /* The skeletons of a fitted coat, each on the link of its bone; frame: the mesh's in the world, with the links where

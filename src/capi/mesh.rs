@@ -14,8 +14,9 @@ use super::handle::{isocoat_body, isocoat_skeleton};
 use super::pointer::{Out, slice_mut};
 use super::query::{ISOCOAT_DEFORMATION_NONE, deformation_from_c, isocoat_deformation};
 use super::status::{Checked, ISOCOAT_ERROR_BUFFER_TOO_SMALL, ISOCOAT_ERROR_LOCKED, Refusal, isocoat_status};
-use super::world::unknown;
+use super::world::{check_reserved, unknown};
 use crate::surface::mesh::Mesh;
+use crate::world::attributes::{STRONGEST, Weights};
 use crate::world::mesh::{MeshDesc, MeshWorkspace, TerritoryStyle};
 
 /// A mesh of triangles, with the memory that making one takes: made again and again it soon asks for no more. It
@@ -30,6 +31,19 @@ pub struct isocoat_mesh {
 struct Held {
     mesh: Mesh,
     workspace: MeshWorkspace,
+    weights: Weights,
+    /// The skeletons of the weights, as C knows them.
+    skeletons: Vec<[isocoat_skeleton; STRONGEST]>,
+    pressures: Vec<f64>,
+}
+
+impl Held {
+    /// Takes the attributes out, and keeps their memory.
+    fn clear_attributes(&mut self) {
+        self.weights.clear();
+        self.skeletons.clear();
+        self.pressures.clear();
+    }
 }
 
 /// Lets go of a mesh, also when the call panics.
@@ -59,6 +73,13 @@ impl isocoat_mesh {
     }
 }
 
+/// What a mesh knows of its vertices besides: ISOCOAT_MESH_ flags, added up.
+pub type isocoat_mesh_attributes = u32;
+/// Whose they are: see isocoat_mesh_get_weights().
+pub const ISOCOAT_MESH_WEIGHTS: isocoat_mesh_attributes = 1;
+/// What presses there: see isocoat_mesh_get_pressures().
+pub const ISOCOAT_MESH_PRESSURES: isocoat_mesh_attributes = 2;
+
 /// What mesh of a body is wanted. Begin with isocoat_mesh_desc_default().
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
@@ -71,15 +92,19 @@ pub struct isocoat_mesh_desc {
     /// a cell may be missed. Of a ball, a quarter of the thickness gives the volume within 3.2 %, an eighth within 1 %.
     /// Default 0, which must be replaced.
     pub cell_size: f64,
+    /// What it is to know of its vertices besides: ISOCOAT_MESH_ flags, added up. Default 0, nothing.
+    pub attributes: isocoat_mesh_attributes,
+    /// Must be 0.
+    pub reserved: u32,
 }
 
-// SAFETY: `repr(C)`, the size first, an integer and a number.
+// SAFETY: `repr(C)`, the size first, integers and a number.
 unsafe impl Descriptor for isocoat_mesh_desc {
     const NAME: &'static str = "isocoat_mesh_desc";
     const FIRST_SIZE: usize = offset_of!(Self, cell_size) + size_of::<f64>();
 
     fn defaults() -> Self {
-        Self { struct_size: 0, deformation: ISOCOAT_DEFORMATION_NONE, cell_size: 0.0 }
+        Self { struct_size: 0, deformation: ISOCOAT_DEFORMATION_NONE, cell_size: 0.0, attributes: 0, reserved: 0 }
     }
 }
 
@@ -159,11 +184,12 @@ pub unsafe extern "C" fn isocoat_mesh_destroy(mesh: *mut isocoat_mesh) -> isocoa
 
 /// Makes a watertight mesh of a body's surface, in place of what the mesh was: closed, each edge between two triangles,
 /// oriented outwards, with the vertices on the surface; the same input gives the same bits. It is empty for a body
-/// without enabled skeletons, and asks for no memory once the mesh has held one as large (of an undeformed body).
+/// without enabled skeletons, and asks for no memory once the mesh has held one as large (of an undeformed body, without
+/// attributes).
 ///
 /// - world: not NULL.
 /// - body: the body; it may be disabled. None of its enabled skeletons may be a plane.
-/// - desc: cell size and shape; not NULL.
+/// - desc: cell size, shape and attributes; not NULL.
 /// - mesh: receives the mesh; not NULL. After an error it is as it was. Its views are void.
 ///
 /// Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE, UNSUPPORTED, CAPACITY for too small a cell size, LOCKED.
@@ -181,9 +207,29 @@ pub unsafe extern "C" fn isocoat_body_make_mesh(
         read(world, |inner| {
             let desc = descriptor::read(desc, "desc")?;
             let deformation = deformation_from_c(desc.deformation)?;
-            let desc = MeshDesc { cell_size: desc.cell_size, deformation };
-            isocoat_mesh::with(mesh, |Held { mesh, workspace }| {
-                Ok(inner.world.mesh_into(body.into(), &desc, workspace, mesh)?)
+            let has = |attribute| desc.attributes & attribute != 0;
+            let known = ISOCOAT_MESH_WEIGHTS | ISOCOAT_MESH_PRESSURES;
+            if desc.attributes & !known != 0 {
+                return Err(Refusal::argument(format!(
+                    "attributes is {:#x}; must be a sum of ISOCOAT_MESH_ flags, at most {known:#x}",
+                    desc.attributes
+                )));
+            }
+            check_reserved(desc.reserved)?;
+            isocoat_mesh::with(mesh, |held| {
+                let (world, body) = (&inner.world, body.into());
+                let wanted = MeshDesc { cell_size: desc.cell_size, deformation };
+                world.mesh_into(body, &wanted, &mut held.workspace, &mut held.mesh)?;
+                held.clear_attributes();
+                let Held { mesh: Mesh { positions, .. }, weights, skeletons, pressures, .. } = held;
+                if has(ISOCOAT_MESH_WEIGHTS) {
+                    world.mesh_weights(body, positions, weights)?;
+                    skeletons.extend(weights.skeletons.iter().map(|four| four.map(isocoat_skeleton::from)));
+                }
+                if has(ISOCOAT_MESH_PRESSURES) {
+                    world.mesh_pressures(body, positions, pressures)?;
+                }
+                Ok(())
             })
         })
     }
@@ -215,8 +261,11 @@ pub unsafe extern "C" fn isocoat_skeleton_make_mesh(
                 ISOCOAT_TERRITORY_SCALES => TerritoryStyle::Scales,
                 other => return Err(unknown("style", other, "ISOCOAT_TERRITORY_", 1)),
             };
-            isocoat_mesh::with(mesh, |Held { mesh, workspace }| {
-                Ok(inner.world.territory_mesh_into(skeleton.into(), style, workspace, mesh)?)
+            isocoat_mesh::with(mesh, |held| {
+                let Held { mesh, workspace, .. } = &mut *held;
+                inner.world.territory_mesh_into(skeleton.into(), style, workspace, mesh)?;
+                held.clear_attributes();
+                Ok(())
             })
         })
     }
@@ -244,7 +293,7 @@ pub unsafe extern "C" fn isocoat_mesh_get_view(
                     positions: mesh.positions.as_ptr().cast(),
                     normals: mesh.normals.as_ptr().cast(),
                     triangles: mesh.triangles.as_ptr().cast(),
-                    valid: if mesh.valid.is_empty() { ptr::null() } else { mesh.valid.as_ptr() },
+                    valid: first(&mesh.valid),
                     vertex_count: mesh.positions.len(),
                     triangle_count: mesh.triangles.len(),
                 });
@@ -252,6 +301,72 @@ pub unsafe extern "C" fn isocoat_mesh_get_view(
             })
         }
     })
+}
+
+/// Whose the vertices of a mesh are, without copying it: for each the four skeletons whose fields are the strongest
+/// there, with their shares of what these make together, as far as a blend graph lets them count. For textures,
+/// materials and bones: the weights of a link are those of its skeletons.
+///
+/// - mesh: not NULL. It must have been made by isocoat_body_make_mesh() with ISOCOAT_MESH_WEIGHTS, or it has none.
+/// - skeletons: receives a pointer to 4 handles a vertex, the strongest first; null handles where there are fewer, and
+///   on a substance. NULL if the mesh has none. Not NULL itself.
+/// - weights: receives a pointer to 4 doubles a vertex, which add up to 1; 0 for null handles. NULL if the mesh has
+///   none. Not NULL itself.
+///
+/// Both point into the mesh (not to be freed), and stay valid until it is made again or destroyed.
+///
+/// Errors: INVALID_ARGUMENT, LOCKED. Threads: the mesh by this thread alone.
+#[must_use]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn isocoat_mesh_get_weights(
+    mesh: *const isocoat_mesh,
+    skeletons: *mut *const isocoat_skeleton,
+    weights: *mut *const f64,
+) -> isocoat_status {
+    free(|| {
+        // SAFETY: the pointers are NULL or as their lines say.
+        unsafe {
+            let (to_skeletons, to_weights) = (Out::new(skeletons, "skeletons")?, Out::new(weights, "weights")?);
+            isocoat_mesh::with(mesh, |Held { weights, skeletons, .. }| {
+                to_skeletons.put(first(skeletons.as_flattened()));
+                to_weights.put(first(weights.weights.as_flattened()));
+                Ok(())
+            })
+        }
+    })
+}
+
+/// What presses on the vertices of a mesh, without copying it: the elastic pressure of contacts, without friction and
+/// dissipation. It is that of the body's own coat, and of a rigid body that of the coat that presses on it; 0 where
+/// nothing presses. Of a deformable body it makes sense in the shapes ISOCOAT_DEFORMATION_CONTACT and _BULGES: its
+/// undeformed surface has no pressure yet.
+///
+/// - mesh: not NULL. It must have been made by isocoat_body_make_mesh() with ISOCOAT_MESH_PRESSURES, or it has none.
+/// - pressures: receives a pointer to a double a vertex, in Pa, at least 0; it points into the mesh (not to be freed),
+///   and stays valid until that is made again or destroyed. NULL if the mesh has none. Not NULL itself.
+///
+/// Errors: INVALID_ARGUMENT, LOCKED. Threads: the mesh by this thread alone.
+#[must_use]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn isocoat_mesh_get_pressures(
+    mesh: *const isocoat_mesh,
+    pressures: *mut *const f64,
+) -> isocoat_status {
+    free(|| {
+        // SAFETY: the pointers are NULL or as their lines say.
+        unsafe {
+            let out = Out::new(pressures, "pressures")?;
+            isocoat_mesh::with(mesh, |Held { pressures, .. }| {
+                out.put(first(pressures));
+                Ok(())
+            })
+        }
+    })
+}
+
+/// Where a list begins; NULL for none.
+fn first<T>(list: &[T]) -> *const T {
+    if list.is_empty() { ptr::null() } else { list.as_ptr() }
 }
 
 /// Copies a mesh into the host's own memory, strided and in either precision; isocoat_mesh_get_view() says how large it

@@ -14,6 +14,7 @@ use super::world::unknown;
 use crate::field::Shape;
 use crate::math::{Pose, Quat, Vec3, rotation_from_vector, rotation_to_vector};
 use crate::world::SkeletonDesc;
+use crate::world::desc::validate_pose;
 
 /// Which primitive a skeleton is: an ISOCOAT_SHAPE_ value. It says what the three points of the descriptor are, all in
 /// the link's frame, in m.
@@ -183,8 +184,8 @@ pub unsafe extern "C" fn isocoat_skeleton_create(
 ///   is in the frame of its own link.
 /// - skeletons: receives count handles; NULL when they are not wanted.
 ///
-/// Errors: as isocoat_skeleton_create; OUT_OF_RANGE for a link_of too large or a frame that is none. Threads: changes
-/// the world.
+/// Errors: as isocoat_skeleton_create, and the message says which element; OUT_OF_RANGE for a link_of too large or a
+/// frame that is none. Threads: changes the world.
 #[must_use]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn isocoat_skeleton_create_many(
@@ -213,6 +214,11 @@ pub unsafe extern "C" fn isocoat_skeleton_create_many(
                     return Err(Refusal::new(ISOCOAT_ERROR_OUT_OF_RANGE, message));
                 };
                 wanted.push(((*link).into(), desc.to_rust().map_err(|refusal| refusal.at("descs", index))?));
+            }
+            frame.as_ref().map_or(Ok(()), validate_pose)?;
+            for (index, (link, desc)) in wanted.iter().enumerate() {
+                let placed = inner.world.place_skeleton(*link, desc, frame.as_ref());
+                placed.map_err(|error| Refusal::from(error).at("descs", index))?;
             }
             let made = inner.world.create_skeletons(&wanted, frame.as_ref())?;
             for (out, made) in out.into_iter().flatten().zip(made) {

@@ -1,11 +1,12 @@
 //! The surface of a coat as others see it: [`ray`] finds where a ray meets it, [`closest`] where it is nearest,
-//! [`deformed`] does both for a coat that others press on, [`mesh`] and [`patches`] show it, [`skin`] hangs a host's mesh
+//! [`deformed`] does both for a coat that others press on, [`mesh`] and [`patches`] show it, [`nearby`] says whose a point is, [`skin`] hangs a host's mesh
 //! on it, and [`fit`] finds a coat whose surface comes close to a mesh.
 
 pub mod closest;
 pub mod deformed;
 pub mod fit;
 pub mod mesh;
+pub mod nearby;
 pub mod patches;
 pub mod prepared;
 pub mod ray;

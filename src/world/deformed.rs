@@ -48,25 +48,29 @@ impl World {
     pub(super) fn deformed_coat(&self, index: usize, deformation: Deformation) -> (Deformed, Vec<usize>) {
         let PosedCoat { coat, skeletons, .. } = self.posed_coat(index);
         let mut deformed = Deformed { coat, obstacles: Vec::new() };
-        let body = &self.bodies[index];
-        if deformation == Deformation::None || body.desc.rigid || !body.enabled || skeletons.is_empty() {
+        if deformation == Deformation::None || self.bodies[index].desc.rigid {
             return (deformed, skeletons);
+        }
+        let neighbours = self.neighbours(index, &deformed.coat);
+        let motions = if neighbours.is_empty() { Vec::new() } else { self.motions() };
+        let obstacle = |(other, coat)| self.obstacle([index, other], coat, deformation, &motions);
+        deformed.obstacles.extend(neighbours.into_iter().map(obstacle));
+        (deformed, skeletons)
+    }
+
+    /// The bodies that may meet a body with this coat, with theirs in its frame: enabled ones whose fields reach it and
+    /// whose masks agree; none if it is disabled itself.
+    pub(super) fn neighbours(&self, index: usize, coat: &Coat) -> Vec<(usize, Coat)> {
+        let body = &self.bodies[index];
+        if !body.enabled || coat.skeletons.is_empty() {
+            return Vec::new();
         }
         let meet = |other: &Body| {
             other.enabled && body.desc.mask & other.desc.category != 0 && other.desc.mask & body.desc.category != 0
         };
-        let mut motions = Vec::new();
-        for other in self.bodies.indices().filter(|other| *other != index && meet(&self.bodies[*other])) {
-            let coat = self.posed_coat_in(other, deformed.coat.origin).coat;
-            if !overlap(&deformed.coat, &coat) {
-                continue;
-            }
-            if motions.is_empty() {
-                motions = self.motions();
-            }
-            deformed.obstacles.push(self.obstacle([index, other], coat, deformation, &motions));
-        }
-        (deformed, skeletons)
+        let others = self.bodies.indices().filter(|other| *other != index && meet(&self.bodies[*other]));
+        let posed = others.map(|other| (other, self.posed_coat_in(other, coat.origin).coat));
+        posed.filter(|(_, other)| overlap(coat, other)).collect()
     }
 
     /// What the second body is to the first.

@@ -3,6 +3,7 @@
 //! This file holds the nouns and their life; [`step`] is the pipeline, [`query`] what can be asked in between.
 
 pub use crate::handle as arena;
+pub mod attributes;
 mod blend;
 mod bytes;
 mod check;
@@ -473,25 +474,10 @@ impl World {
         frame: Option<&Pose>,
     ) -> Result<Vec<SkeletonId>> {
         frame.map_or(Ok(()), desc::validate_pose)?;
-        let unit = |frame: &Pose| Pose { rotation: Quat::new_normalize(frame.rotation.into_inner()), ..*frame };
-        let frame = frame.map(unit);
-        let mut placed = Vec::with_capacity(skeletons.len());
-        for (link, desc) in skeletons {
-            let mut desc = desc.clone();
-            if let Some(frame) = &frame {
-                let pose = self.links.get(*link)?.desc.pose;
-                // One motion: in the frame of the link itself, what is given stays as it is.
-                let motion = Pose {
-                    position: pose.inverse_transform_point(&frame.position),
-                    rotation: pose.rotation.inverse() * frame.rotation,
-                };
-                desc.shape = desc.shape.transformed(&motion);
-            }
-            let profile = self.check_skeleton(*link, &desc)?;
-            placed.push((*link, desc, profile));
-        }
+        let placed = skeletons.iter().map(|(link, desc)| Ok((*link, self.place_skeleton(*link, desc, frame)?)));
+        let placed = placed.collect::<Result<Vec<_>>>()?;
         let (mut made, mut bodies) = (Vec::with_capacity(skeletons.len()), Vec::new());
-        for (link, desc, profile) in placed {
+        for (link, (desc, profile)) in placed {
             match self.add_skeleton(link, desc, profile) {
                 Ok((id, body)) => {
                     made.push(id);
@@ -507,6 +493,28 @@ impl World {
         bodies.dedup();
         bodies.into_iter().for_each(|body| self.refresh(body));
         Ok(made)
+    }
+
+    /// A skeleton of [`World::create_skeletons`] in the frame of its link, checked; the frame of all is valid.
+    pub(crate) fn place_skeleton(
+        &self,
+        link: LinkId,
+        desc: &SkeletonDesc,
+        frame: Option<&Pose>,
+    ) -> Result<(SkeletonDesc, Profile)> {
+        let mut desc = desc.clone();
+        if let Some(frame) = frame {
+            let pose = self.links.get(link)?.desc.pose;
+            let rotation = Quat::new_normalize(frame.rotation.into_inner());
+            // One motion: in the frame of the link itself, what is given stays as it is.
+            let motion = Pose {
+                position: pose.inverse_transform_point(&frame.position),
+                rotation: pose.rotation.inverse() * rotation,
+            };
+            desc.shape = desc.shape.transformed(&motion);
+        }
+        let profile = self.check_skeleton(link, &desc)?;
+        Ok((desc, profile))
     }
 
     /// Adds a checked skeleton, and says to which body.

@@ -9,6 +9,14 @@ use crate::surface::deformed::Deformed;
 use crate::surface::prepared::Prepared;
 use crate::surface::{SurfaceHit, closest, ray};
 
+/// Accepts points of the world.
+pub(super) fn require_points(points: &[[f64; 3]]) -> Result<()> {
+    match points.iter().find(|p| !p.iter().all(|x| x.is_finite())) {
+        Some([x, y, z]) => Err(out_of_range("point", format_args!("({x}, {y}, {z})"), "finite")),
+        None => Ok(()),
+    }
+}
+
 /// Where a ray meets a coat.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayHit {
@@ -158,9 +166,7 @@ impl World {
         if lengths.iter().flatten().any(|length| *length != points.len()) {
             return Err(Error::Unsupported("values and gradients must be as long as points"));
         }
-        if let Some(p) = points.iter().find(|p| !p.iter().all(|x| x.is_finite())) {
-            return Err(out_of_range("point", format_args!("({}, {}, {})", p[0], p[1], p[2]), "finite"));
-        }
+        require_points(points)?;
         let (Deformed { coat, obstacles }, _) = self.deformed_coat(body.index(), deformation);
         let local: Vec<[f64; 3]> = points.iter().map(|p| (Vec3::from(*p) - coat.origin).into()).collect();
         if obstacles.is_empty() {

@@ -124,6 +124,42 @@ static void bones_have_their_own(void)
     isocoat_world_destroy(world);
 }
 
+static void of_many_the_refused_one_is_named_and_none_is_made(void)
+{
+    isocoat_world *world = new_world();
+    const isocoat_link host = new_link(world, new_body(world), ISOCOAT_LINK_HOST, 0.0);
+    const isocoat_link links[2] = {host, {0, 0, 0}};
+    isocoat_skeleton_desc row[20];
+    isocoat_skeleton made[20] = {{9, 9, 9}};
+    uint32_t of[20] = {0};
+    isocoat_pose frame = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 1.0}};
+    size_t count = 1;
+    int k;
+
+    for (k = 0; k < 20; ++k) row[k] = isocoat_skeleton_desc_default(), row[k].thickness = 0.1;
+    row[17].thickness = -1.0;
+    REFUSED(isocoat_skeleton_create_many(world, links, 2, row, of, 20, NULL, made), ISOCOAT_ERROR_OUT_OF_RANGE,
+            "descs[17]: thickness is -1; must be");
+    REFUSED(isocoat_skeleton_create_many(world, links, 2, row, of, 20, &frame, made), ISOCOAT_ERROR_OUT_OF_RANGE,
+            "descs[17]: thickness is -1; must be");
+    row[17].thickness = 0.1, row[3].shape = ISOCOAT_SHAPE_PLANE, row[3].points[1][2] = 1.0;
+    REFUSED(isocoat_skeleton_create_many(world, links, 2, row, of, 20, NULL, made), ISOCOAT_ERROR_UNSUPPORTED,
+            "descs[3]: ");
+    row[3] = row[0], row[5].shape = 99;
+    REFUSED(isocoat_skeleton_create_many(world, links, 2, row, of, 20, NULL, made), ISOCOAT_ERROR_INVALID_ARGUMENT,
+            "descs[5]: shape is 99");
+    row[5] = row[0], of[11] = 1;
+    REFUSED(isocoat_skeleton_create_many(world, links, 2, row, of, 20, NULL, made), ISOCOAT_ERROR_INVALID_HANDLE,
+            "descs[11]: link: the handle is null");
+    of[11] = 0, frame.orientation[3] = 2.0;
+    REFUSED(isocoat_skeleton_create_many(world, links, 2, row, of, 20, &frame, made), ISOCOAT_ERROR_OUT_OF_RANGE,
+            "norm of the rotation quaternion is 2");
+    OK(isocoat_link_get_skeletons(world, host, NULL, 0, &count));
+    CHECK(count == 0 && made[0].index == 9);
+    OK(isocoat_skeleton_create_many(world, links, 2, row, of, 20, NULL, made));
+    isocoat_world_destroy(world);
+}
+
 static void what_cannot_be_is_refused(void)
 {
     isocoat_fit_desc desc = isocoat_fit_desc_default();
@@ -158,6 +194,7 @@ int main(void)
 {
     a_fit_becomes_a_coat();
     bones_have_their_own();
+    of_many_the_refused_one_is_named_and_none_is_made();
     what_cannot_be_is_refused();
     return verdict("fit");
 }

@@ -123,6 +123,71 @@ static void territories_have_meshes_of_their_seeds(void)
     isocoat_world_destroy(world);
 }
 
+static void vertices_know_whose_they_are_and_what_presses(void)
+{
+    isocoat_world *world = new_world();
+    const ball it = new_ball(world, ISOCOAT_LINK_FIXED, 0.0), other = new_ball(world, ISOCOAT_LINK_FIXED, 0.15);
+    isocoat_mesh_desc desc = isocoat_mesh_desc_default();
+    isocoat_skeleton_desc second = isocoat_skeleton_desc_default();
+    isocoat_mesh *mesh = new_mesh();
+    isocoat_mesh_view view;
+    const isocoat_skeleton *skeletons = &it.skeleton;
+    const double *weights = &desc.cell_size, *pressures = weights;
+    isocoat_skeleton made;
+    size_t v, pressed = 0;
+
+    OK(isocoat_skeleton_get_desc(world, it.skeleton, &second));
+    second.points[0][0] = 0.12;
+    OK(isocoat_skeleton_create(world, it.link, &second, &made));
+    desc.cell_size = 0.0125;
+    desc.deformation = ISOCOAT_DEFORMATION_CONTACT;
+    OK(isocoat_body_make_mesh(world, it.body, &desc, mesh));
+    OK(isocoat_mesh_get_weights(mesh, &skeletons, &weights));
+    OK(isocoat_mesh_get_pressures(mesh, &pressures));
+    CHECK(skeletons == NULL && weights == NULL && pressures == NULL);
+
+    desc.attributes = ISOCOAT_MESH_WEIGHTS | ISOCOAT_MESH_PRESSURES;
+    OK(isocoat_body_make_mesh(world, it.body, &desc, mesh));
+    OK(isocoat_mesh_get_view(mesh, &view));
+    OK(isocoat_mesh_get_weights(mesh, &skeletons, &weights));
+    OK(isocoat_mesh_get_pressures(mesh, &pressures));
+    for (v = 0; v < view.vertex_count; ++v) {
+        const double x = view.positions[3 * v];
+        CHECK_NEAR(weights[4 * v] + weights[4 * v + 1], 1.0, 1e-14);
+        CHECK(weights[4 * v + 2] == 0.0 && skeletons[4 * v + 2].generation == 0);
+        if (fabs(x - 0.06) > 1e-3) CHECK(same_skeleton(skeletons[4 * v], x < 0.06 ? it.skeleton : made));
+        CHECK(pressures[v] >= 0.0);
+        pressed += pressures[v] > 0.0;
+    }
+    CHECK(pressed > 20 && pressed < view.vertex_count / 2);
+
+    /* A host that was compiled before there were attributes. */
+    desc.struct_size = offsetof(isocoat_mesh_desc, attributes);
+    OK(isocoat_body_make_mesh(world, it.body, &desc, mesh));
+    OK(isocoat_mesh_get_pressures(mesh, &pressures));
+    CHECK(pressures == NULL);
+    desc.struct_size = sizeof desc;
+
+    desc.attributes = ISOCOAT_MESH_PRESSURES;
+    OK(isocoat_body_make_mesh(world, other.body, &desc, mesh));
+    OK(isocoat_mesh_get_weights(mesh, &skeletons, &weights));
+    OK(isocoat_mesh_get_pressures(mesh, &pressures));
+    CHECK(weights == NULL && pressures != NULL);
+    desc.attributes = 4;
+    REFUSED(isocoat_body_make_mesh(world, it.body, &desc, mesh), ISOCOAT_ERROR_INVALID_ARGUMENT,
+            "attributes is 0x4; must be a sum of ISOCOAT_MESH_ flags, at most 0x3");
+    desc.attributes = 0, desc.reserved = 1;
+    REFUSED(isocoat_body_make_mesh(world, it.body, &desc, mesh), ISOCOAT_ERROR_INVALID_ARGUMENT, "reserved is 1");
+    REFUSED(isocoat_mesh_get_weights(mesh, NULL, &weights), ISOCOAT_ERROR_INVALID_ARGUMENT, "skeletons is NULL");
+    REFUSED(isocoat_mesh_get_weights(mesh, &skeletons, NULL), ISOCOAT_ERROR_INVALID_ARGUMENT, "weights is NULL");
+    REFUSED(isocoat_mesh_get_pressures(NULL, &pressures), ISOCOAT_ERROR_INVALID_ARGUMENT, "mesh is NULL");
+    OK(isocoat_skeleton_make_mesh(world, it.skeleton, ISOCOAT_TERRITORY_PATCHES, mesh));
+    OK(isocoat_mesh_get_pressures(mesh, &pressures));
+    CHECK(pressures == NULL);
+    OK(isocoat_mesh_destroy(mesh));
+    isocoat_world_destroy(world);
+}
+
 static void what_makes_no_sense_is_refused(void)
 {
     isocoat_world *world = new_world();
@@ -178,6 +243,7 @@ int main(void)
     a_ball_has_a_closed_mesh();
     a_mesh_is_copied_in_either_precision();
     territories_have_meshes_of_their_seeds();
+    vertices_know_whose_they_are_and_what_presses();
     what_makes_no_sense_is_refused();
     return verdict("mesh");
 }

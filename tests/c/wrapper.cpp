@@ -367,6 +367,11 @@ static void queries()
     CHECK(mesh.normals().size() == mesh.view().vertex_count);
     bodies[0].make_mesh(mesh, 0.02, ISOCOAT_DEFORMATION_CONTACT);
     CHECK(mesh.view().vertex_count > 0 && mesh.view().valid == nullptr);
+    CHECK(mesh.weights().empty() && mesh.strongest().empty() && mesh.pressures().empty());
+    bodies[0].make_mesh(mesh, 0.02, ISOCOAT_DEFORMATION_CONTACT, ISOCOAT_MESH_WEIGHTS | ISOCOAT_MESH_PRESSURES);
+    CHECK(mesh.weights().size() == mesh.view().vertex_count && mesh.weights().front()[0] > 0.25);
+    CHECK(mesh.strongest().size() == mesh.weights().size() && mesh.strongest().front()[0].generation != 0);
+    CHECK(mesh.pressures().size() == mesh.weights().size() && mesh.pressures().front() >= 0.0);
     point.make_mesh(mesh);
     CHECK(mesh.positions() == seeds.positions);
 

@@ -71,8 +71,11 @@ impl Distance for ToPoint {
 
     #[inline(always)]
     fn square_span<const W: usize>(&self, center: [Lanes<W>; 3], half: f64) -> (Lanes<W>, Lanes<W>) {
-        let (offset, half) = (sub(center, splat(&self.0)).map(Lanes::abs), Lanes::splat(half));
-        let (near, far) = (offset.map(|x| (x - half).max(Lanes::splat(0.0))), offset.map(|x| x + half));
+        // Not by `map` of arrays, which may become calls of functions without the wide instructions.
+        let ([x, y, z], half) = (sub(center, splat(&self.0)), Lanes::splat(half));
+        let (x, y, z) = (x.abs(), y.abs(), z.abs());
+        let nearer = |x: Lanes<W>| (x - half).max(Lanes::splat(0.0));
+        let (near, far) = ([nearer(x), nearer(y), nearer(z)], [x + half, y + half, z + half]);
         (dot(near, near), dot(far, far))
     }
 }
@@ -98,9 +101,9 @@ impl Distance for ToSegment {
 
     #[inline(always)]
     fn away<const W: usize>(&self, p: [Lanes<W>; 3]) -> Away<W> {
-        let (offset, edge) = (sub(p, splat(&self.start)), splat(&self.edge));
+        let (offset, [x, y, z]) = (sub(p, splat(&self.start)), splat(&self.edge));
         let along = dot(offset, splat(&self.dual)).clamp(Lanes::splat(0.0), Lanes::splat(1.0));
-        let direction = sub(offset, edge.map(|x| x * along));
+        let direction = sub(offset, [x * along, y * along, z * along]);
         let distance = dot(direction, direction).sqrt();
         Away { distance, direction, length: distance }
     }

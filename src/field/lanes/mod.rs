@@ -15,6 +15,7 @@
 //! The scalar twin, and the reference in the tests, is [`blend::value_gradient`](super::blend::value_gradient): it
 //! agrees to round-off, not in its bits, because divisions by a skeleton's constants are multiplications here.
 
+use std::mem::MaybeUninit;
 use std::sync::atomic::{Ordering, compiler_fence};
 
 mod dispatch;
@@ -91,13 +92,16 @@ impl Kernel for Query<'_> {
         let count = some.map_or(skeletons.len(), <[u32]>::len);
         assert!(values.as_ref().is_none_or(|v| v.len() == points.len()), "values and points differ in length");
         assert!(gradients.as_ref().is_none_or(|g| g.len() == points.len()), "gradients and points differ in length");
-        let mut blocks = [Block::<W>::EMPTY; CHUNK];
+        // Only what is used is written: to clear it all would cost as much as the fields of some skeletons.
+        let mut room = [const { MaybeUninit::<Block<W>>::uninit() }; CHUNK];
         for (index, points) in points.chunks(CHUNK * W).enumerate() {
             let range = index * CHUNK * W..index * CHUNK * W + points.len();
-            let blocks = &mut blocks[..points.len().div_ceil(W)];
-            for (block, points) in blocks.iter_mut().zip(points.chunks(W)) {
-                block.load(points);
+            let room = &mut room[..points.len().div_ceil(W)];
+            for (place, points) in room.iter_mut().zip(points.chunks(W)) {
+                place.write(Block::new(points));
             }
+            // SAFETY: each was written just now: there are as many as there are registers of points.
+            let blocks = unsafe { std::slice::from_raw_parts_mut(room.as_mut_ptr().cast::<Block<W>>(), room.len()) };
             let mut falloff = Falloff::NONE;
             for index in 0..count {
                 let skeleton = &skeletons[some.map_or(index, |some| some[index] as usize)];
@@ -140,23 +144,18 @@ struct Block<const W: usize> {
 }
 
 impl<const W: usize> Block<W> {
-    const EMPTY: Self = {
+    /// Up to `W` points, padded with the origin, and no sums yet.
+    #[inline(always)]
+    fn new(points: &[[f64; 3]]) -> Self {
         let zero = Lanes([0.0; W]);
         let away = Away { distance: zero, direction: [zero; 3], length: zero };
-        Self { point: [zero; 3], value: zero, gradient: [zero; 3], away }
-    };
-
-    /// Takes up to `W` new points, pads them with the origin, and sets the sums to zero.
-    #[inline(always)]
-    fn load(&mut self, points: &[[f64; 3]]) {
-        self.point = Self::EMPTY.point;
-        self.value = Self::EMPTY.value;
-        self.gradient = Self::EMPTY.gradient;
+        let mut block = Self { point: [zero; 3], value: zero, gradient: [zero; 3], away };
         for (lane, point) in points.iter().enumerate() {
-            for (lanes, x) in self.point.iter_mut().zip(point) {
+            for (lanes, x) in block.point.iter_mut().zip(point) {
                 lanes.0[lane] = *x;
             }
         }
+        block
     }
 }
 

@@ -124,7 +124,7 @@ fn span_shape<S: Distance, const W: usize>(
     falloff: &Falloff,
     cubes: &Cubes,
 ) -> u32 {
-    let (zero, radius) = (Lanes::splat(0.0), Lanes::splat(falloff.radius));
+    let radius = Lanes::splat(falloff.radius);
     let square = radius * radius;
     let mut reach = 0;
     for (index, block) in blocks.iter_mut().enumerate() {
@@ -134,12 +134,10 @@ fn span_shape<S: Distance, const W: usize>(
         block.least = block.least + least;
         block.strongest = block.strongest.max(least);
         block.most = block.most + falloff.value_slope(near, S::SOLID).0;
-        // Bits as numbers, which add up exactly: comparisons stay in registers.
-        let bits = |bit: u32| Lanes(std::array::from_fn(|lane| f64::from(bit << lane)));
-        let sum = radius.where_greater(near, bits(Spans::REACH), zero)
-            + square.where_greater(near_inner, bits(Spans::INNER), zero)
-            + square.where_greater(far_inner, bits(Spans::ALL_OVER), zero);
-        reach |= (sum.sum() as u32) << (index * W);
+        let bits = (Spans::REACH * near.bits_where_less(radius))
+            | (Spans::INNER * near_inner.bits_where_less(square))
+            | (Spans::ALL_OVER * far_inner.bits_where_less(square));
+        reach |= bits << (index * W);
     }
     reach
 }

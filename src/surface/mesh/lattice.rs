@@ -45,7 +45,8 @@ impl Lattice {
     /// Where a sample is: `corner` counts samples to the first one of its brick.
     #[inline]
     pub fn position(&self, corner: [u32; 3], sample: [usize; 3]) -> [f64; 3] {
-        [0, 1, 2].map(|k| self.origin[k] + self.cell * f64::from(corner[k] + sample[k] as u32))
+        let along = |k: usize| self.origin[k] + self.cell * f64::from(corner[k] + sample[k] as u32);
+        [along(0), along(1), along(2)]
     }
 
     /// A place given in samples.

@@ -24,7 +24,7 @@ pub mod table;
 use crate::error::{Error, Result, out_of_range};
 pub use crate::field::lanes::{Cubes, Spans};
 use crate::math::Vec3;
-use bricks::{Bricks, Near};
+use bricks::Bricks;
 use lattice::{Lattice, Sorted};
 use root::{Crossing, Roots, Sizes};
 use table::{EDGES, TABLE};
@@ -137,7 +137,7 @@ impl Workspace {
             self.vertices.resize(count, [[0; 3]; bricks::SAMPLES]);
         }
         for brick in 0..count {
-            let near = self.bricks.near(brick);
+            let (near, corner) = (self.bricks.near(brick), self.bricks.corner(brick));
             self.crossings.clear();
             let first = out.positions.len();
             self.bricks.for_each_crossing(&near, |sample, axis| {
@@ -145,7 +145,7 @@ impl Workspace {
                 let mut end = sample;
                 end[axis] += 1;
                 let ends = [self.bricks.value(&near, sample), self.bricks.value(&near, end)];
-                let base = lattice.position(self.bricks.corner(brick), sample);
+                let base = lattice.position(corner, sample);
                 self.crossings.push(Crossing::new(base, axis, ends));
             });
             if !self.crossings.is_empty() {
@@ -163,19 +163,17 @@ impl Workspace {
         for brick in 0..self.bricks.len() {
             let near = self.bricks.near(brick);
             self.bricks.for_each_mixed_cell(&near, |cell, case| {
-                for triangle in table.triangles(case) {
-                    out.triangles.push(triangle.map(|edge| self.vertex(&near, cell, edge.into())));
-                }
+                let [x, y, z] = cell;
+                let corner = |k: usize| near.find([x + (k & 1), y + (k >> 1 & 1), z + (k >> 2)]);
+                let corners: [(usize, usize); 8] = std::array::from_fn(corner);
+                let vertex = |edge: u8| {
+                    let (corner, axis) = EDGES[usize::from(edge)];
+                    let (brick, index) = corners[corner];
+                    self.vertices[brick][index][axis]
+                };
+                let triangles = table.triangles(case).iter();
+                out.triangles.extend(triangles.map(|[a, b, c]| [vertex(*a), vertex(*b), vertex(*c)]));
             });
         }
-    }
-
-    /// The vertex on one of [`EDGES`] of a cell.
-    #[inline]
-    fn vertex(&self, near: &Near, cell: [usize; 3], edge: usize) -> u32 {
-        let (corner, axis) = EDGES[edge];
-        let sample = [0, 1, 2].map(|k| cell[k] + (corner >> k & 1));
-        let (brick, index) = near.find(sample);
-        self.vertices[brick][index][axis]
     }
 }

@@ -7,8 +7,9 @@ use crate::math::Vec3;
 const LAST_STEP: f64 = 0.05;
 /// What the bend of the field may leave of an error after the last step, over the length scale of the solid.
 const ERROR: f64 = 4e-5;
-/// The same where the slope may jump on the way, which is then taken for granted.
-const ERROR_AT_KINKS: f64 = 3e-4;
+/// Longest last step, over the same, where the slope may jump on the way: neither end of the edge tells of a narrow
+/// bulge between them, so the point before the step has to be this near already.
+const LAST_STEP_AT_KINKS: f64 = 3e-4;
 /// A step, over the same, that needs no look at the bend.
 const NO_STEP: f64 = 1e-6;
 /// Nearest to an end of the edge, in cells: vertices of edges that meet there stay apart.
@@ -62,18 +63,18 @@ impl Crossing {
         let (near, other) =
             if excess >= 0.0 { (&mut self.inside, &self.outside) } else { (&mut self.outside, &self.inside) };
         let (place, far, step) = (self.place, other[0] - self.place, -excess / slope);
-        // What the field at either end says about how it bends, or how its slope jumps, on the way there.
+        // What the field at either end says about how it bends on the way there.
         let error_by = |end: &[f64; 2]| {
             let length = end[0] - place;
             let change = ((end[1] - excess) / length / slope - 1.0).abs();
-            change * step.abs() * if sizes.kinks { 1.0 } else { (step / length).abs() }
+            change * step * step / length.abs()
         };
-        let error = error_by(near).max(error_by(other)) * sizes.cell;
+        let error = error_by(near).max(error_by(other));
         *near = [place, excess];
         let within = step / far >= 0.0 && step / far <= 1.0;
-        let most = if sizes.kinks { ERROR_AT_KINKS } else { ERROR };
-        let short =
-            step.abs() <= LAST_STEP && error <= most * sizes.scale || step.abs() * sizes.cell <= NO_STEP * sizes.scale;
+        let at_most = |length: f64, part: f64| length * sizes.cell <= part * sizes.scale;
+        let near_enough = if sizes.kinks { at_most(step.abs(), LAST_STEP_AT_KINKS) } else { at_most(error, ERROR) };
+        let short = step.abs() <= LAST_STEP && near_enough || at_most(step.abs(), NO_STEP);
         let done = excess == 0.0 || within && short || far.abs() <= 1e-12;
         self.place = match done {
             true if within => (self.place + step).clamp(MARGIN, 1.0 - MARGIN),

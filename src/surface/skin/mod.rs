@@ -14,10 +14,10 @@ mod settle;
 
 pub use follow::Motion;
 
+use super::nearby::Nearby;
 use super::prepared::Prepared;
-use super::tree::Tree;
 use crate::coat::Coat;
-use crate::field::{Placed, blend};
+use crate::field::blend;
 use crate::math::Vec3;
 use follow::Blend;
 use settle::{Settler, Vertex};
@@ -73,14 +73,9 @@ impl Skin {
     /// field reaches, the link of the nearest surface has all of it.
     pub fn bind(coat: &Coat, links: &[u32], vertices: &[Vec3], normals: Option<&[Vec3]>) -> Self {
         let mut skin = Self { has_normals: normals.is_some(), ..Self::default() };
-        let mut tree = Tree::default();
-        tree.build_of(coat);
-        let (mut near, mut small) = (Vec::new(), Coat::default());
+        let mut nearby = Nearby::new(coat);
         for (number, position) in vertices.iter().enumerate() {
-            near.clear();
-            tree.near(position, 0.0, |skeleton| near.push(skeleton));
-            near.sort_unstable();
-            coat.subset_into(&near, &mut small);
+            let (small, near) = nearby.at(position);
             let first = skin.weights.len();
             let mut sum = 0.0;
             blend::parts(&small.skeletons, &small.graph, position, |index, part| {
@@ -97,7 +92,7 @@ impl Skin {
                 skin.weights[first..].iter_mut().for_each(|(_, weight)| *weight /= sum);
                 skin.weights[first..].sort_by(|a, b| b.1.total_cmp(&a.1));
             } else {
-                let nearest = nearest(coat, position);
+                let nearest = nearby.nearest(position).expect("the coat has skeletons");
                 skin.weights.push((links[nearest], 1.0));
                 outward = Some(coat.skeletons[nearest].shape.closest(position).normal);
             }
@@ -189,13 +184,6 @@ impl Skin {
             }
         }
     }
-}
-
-/// The skeleton whose isolated surface is nearest.
-fn nearest(coat: &Coat, p: &Vec3) -> usize {
-    let depth = |skeleton: &Placed| skeleton.shape.closest(p).distance - skeleton.profile.thickness;
-    let depths = coat.skeletons.iter().map(depth).enumerate();
-    depths.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(index, _)| index)
 }
 
 /// Turns a vector by the smallest rotation that takes the unit vector `from` to the unit vector `to`.

@@ -1,4 +1,5 @@
-//! Binary glTF: a scene of meshes; what is rigid moves by its links, the rest shows one mesh a frame.
+//! Binary glTF: a scene of meshes. What is rigid moves as a node, a body of many links hangs on its links as a skin, and what
+//! flows shows one mesh a frame.
 
 use std::io::Result;
 use std::path::Path;
@@ -9,6 +10,7 @@ use serde_json::{Value, json};
 
 const FLOAT: u32 = 5126;
 const UINT: u32 = 5125;
+const USHORT: u32 = 5123;
 const VERTICES: u32 = 34962;
 const CORNERS: u32 = 34963;
 
@@ -19,6 +21,7 @@ pub struct Glb {
     accessors: Vec<Value>,
     meshes: Vec<Value>,
     nodes: Vec<Value>,
+    skins: Vec<Value>,
     samplers: Vec<Value>,
     channels: Vec<Value>,
     colours: usize,
@@ -32,6 +35,7 @@ impl Glb {
             accessors: Vec::new(),
             meshes: Vec::new(),
             nodes: Vec::new(),
+            skins: Vec::new(),
             samplers: Vec::new(),
             channels: Vec::new(),
             colours: 0,
@@ -84,6 +88,32 @@ impl Glb {
             "attributes": { "POSITION": positions, "NORMAL": normals }, "indices": corners, "material": colour,
         }] }));
         Some(self.meshes.len() - 1)
+    }
+
+    /// Hangs a mesh on joints: of each vertex up to four, with weights that add up to 1.
+    pub fn hang(&mut self, mesh: usize, joints: &[[u16; 4]], weights: &[[f32; 4]]) {
+        let bytes: Vec<u8> = joints.as_flattened().iter().flat_map(|joint| joint.to_le_bytes()).collect();
+        let description = json!({ "componentType": USHORT, "count": joints.len(), "type": "VEC4" });
+        let joints = self.accessor(&bytes, Some(VERTICES), description);
+        let weights = self.floats(weights.as_flattened(), "VEC4", 4, Some(VERTICES), false);
+        let attributes = &mut self.meshes[mesh]["primitives"][0]["attributes"];
+        (attributes["JOINTS_0"], attributes["WEIGHTS_0"]) = (joints.into(), weights.into());
+    }
+
+    /// Adds a node that shows nothing: a joint of a skin.
+    pub fn joint(&mut self, name: &str, pose: &Pose) -> usize {
+        self.nodes.push(json!({
+            "name": name, "translation": numbers(&pose.position), "rotation": quaternion(pose),
+        }));
+        self.nodes.len() - 1
+    }
+
+    /// Adds a node that shows a mesh of the world as its joints carry it; `poses` are theirs when it hangs as it is.
+    pub fn skin(&mut self, name: &str, mesh: usize, joints: &[usize], poses: &[Pose]) {
+        let matrices: Vec<f32> = poses.iter().flat_map(inverse_matrix).collect();
+        let matrices = self.floats(&matrices, "MAT4", 16, None, false);
+        self.skins.push(json!({ "joints": joints, "inverseBindMatrices": matrices }));
+        self.nodes.push(json!({ "name": name, "mesh": mesh, "skin": self.skins.len() - 1 }));
     }
 
     /// Adds a node that shows a mesh.
@@ -148,6 +178,7 @@ impl Glb {
         for (name, list) in [
             ("meshes", self.meshes),
             ("materials", materials),
+            ("skins", self.skins),
             ("accessors", self.accessors),
             ("bufferViews", self.views),
         ] {
@@ -194,6 +225,19 @@ fn numbers(v: &Vec3) -> [f32; 3] {
 fn quaternion(pose: &Pose) -> [f32; 4] {
     let q = pose.rotation.coords;
     [q.x as f32, q.y as f32, q.z as f32, q.w as f32]
+}
+
+/// What takes the world to the frame of a pose, column by column.
+fn inverse_matrix(pose: &Pose) -> [f32; 16] {
+    let turn = pose.rotation.inverse();
+    let axes = [Vec3::x(), Vec3::y(), Vec3::z()].map(|axis| turn * axis);
+    let place = pose.inverse_transform_point(&Vec3::zeros());
+    let mut matrix = [0.0; 16];
+    for (column, v) in axes.iter().chain([&place]).enumerate() {
+        matrix[4 * column..4 * column + 3].copy_from_slice(&numbers(v));
+    }
+    matrix[15] = 1.0;
+    matrix
 }
 
 #[cfg(test)]

@@ -15,7 +15,8 @@ use isocoat::World;
 use isocoat::field::Shape;
 use isocoat::math::{Pose, Vec3};
 use isocoat::surface::mesh::Mesh;
-use isocoat::world::mesh::{MeshDesc, TerritoryStyle};
+use isocoat::world::attributes::Weights;
+use isocoat::world::mesh::MeshDesc;
 use isocoat::world::{BodyId, Deformation, LinkId, Playback};
 use lexopt::prelude::*;
 
@@ -29,7 +30,7 @@ Usage: isocoat-view COMMAND RECORDING [OUTPUT] [OPTIONS]
   film RECORDING out.png     an animated picture (APNG)
   frames RECORDING folder    a picture of each frame
   mesh RECORDING out.obj     the meshes of one frame: .obj, .ply or .glb
-  animate RECORDING out.glb  links as they move, substances frame by frame
+  animate RECORDING out.glb  coats on their links as these move, substances frame by frame
 
 Frames:
   --frame N             the frame of still and mesh [the last]
@@ -61,14 +62,19 @@ struct Options {
     view: View,
 }
 
+impl Default for Options {
+    fn default() -> Self {
+        Self { frame: None, from: 0, to: None, step: 1, speed: 1.0, cell: None, view: View::default() }
+    }
+}
+
 fn numbers<const N: usize>(text: &str) -> Outcome<[f64; N]> {
     let list = text.split([',', 'x']).map(str::parse).collect::<Result<Vec<f64>, _>>()?;
     list.try_into().map_err(|_| format!("{text}: must be {N} numbers").into())
 }
 
 fn parse() -> Outcome<Option<(Vec<String>, Options)>> {
-    let mut options =
-        Options { frame: None, from: 0, to: None, step: 1, speed: 1.0, cell: None, view: View::default() };
+    let mut options = Options::default();
     let (mut words, mut parser) = (Vec::new(), lexopt::Parser::from_env());
     while let Some(argument) = parser.next()? {
         let long = match argument {
@@ -240,22 +246,6 @@ fn mesh(world: &World, options: &Options, output: &Path) -> Outcome<()> {
     Ok(())
 }
 
-/// A link's part of its body's coat, in the world.
-fn link_mesh(world: &World, body: BodyId, link: LinkId, cell_size: f64) -> Outcome<Mesh> {
-    if world.body_links(body)?.count() == 1 {
-        return Ok(world.mesh(body, &MeshDesc::new(cell_size))?);
-    }
-    let mut whole = Mesh::default();
-    for skeleton in world.link_skeletons(link)? {
-        let part = world.territory_mesh(skeleton, TerritoryStyle::Patches)?;
-        let first = whole.positions.len() as u32;
-        whole.positions.extend(part.positions);
-        whole.normals.extend(part.normals);
-        whole.triangles.extend(part.triangles.iter().map(|triangle| triangle.map(|corner| corner + first)));
-    }
-    Ok(whole)
-}
-
 /// A link that moves through the frames, and the node that shows it.
 struct Track {
     link: LinkId,
@@ -264,8 +254,53 @@ struct Track {
     poses: Vec<Pose>,
 }
 
+/// Shows a body's coat as it is now, undeformed, on the links that carry it: one alone as a node, several as the joints of a
+/// skin. Nothing for an empty mesh.
+fn bind(glb: &mut glb::Glb, world: &World, body: BodyId, cell_size: f64, colour: usize) -> Outcome<Vec<Track>> {
+    let mesh = world.mesh(body, &MeshDesc::new(cell_size))?;
+    let links: Vec<LinkId> = world.body_links(body)?.collect();
+    let poses = links.iter().map(|link| Ok(world.link_state(*link)?.pose)).collect::<Outcome<Vec<_>>>()?;
+    let track = |(link, node)| Track { link, node, times: Vec::new(), poses: Vec::new() };
+    if let ([link], [pose]) = (&links[..], &poses[..]) {
+        let mesh = glb.mesh(&mesh, pose, colour);
+        return Ok(mesh.into_iter().map(|mesh| track((*link, glb.node(&name(body), mesh, pose)))).collect());
+    }
+    let Some(shown) = glb.mesh(&mesh, &Pose::default(), colour) else { return Ok(Vec::new()) };
+    let (joints, weights) = joint_weights(world, body, &mesh, &links)?;
+    glb.hang(shown, &joints, &weights);
+    let joint = |(link, pose): (&LinkId, &Pose)| glb.joint(&format!("{} link{}", name(body), link.raw.index), pose);
+    let nodes: Vec<usize> = links.iter().zip(&poses).map(joint).collect();
+    glb.skin(&name(body), shown, &nodes, &poses);
+    Ok(links.into_iter().zip(nodes).map(track).collect())
+}
+
+/// Of each vertex up to four joints, and their weights.
+type JointWeights = (Vec<[u16; 4]>, Vec<[f32; 4]>);
+
+/// Up to four links of each vertex, by their numbers, with their weights: those of their skeletons together.
+fn joint_weights(world: &World, body: BodyId, mesh: &Mesh, links: &[LinkId]) -> Outcome<JointWeights> {
+    let mut of = Weights::default();
+    world.mesh_weights(body, &mesh.positions, &mut of)?;
+    let (mut joints, mut weights) = (Vec::new(), Vec::new());
+    for (skeletons, parts) in of.skeletons.iter().zip(&of.weights) {
+        let (mut numbers, mut sums, mut count) = ([0; 4], [0.0; 4], 0);
+        for (skeleton, part) in skeletons.iter().zip(parts).filter(|(_, part)| **part > 0.0) {
+            let link = world.skeleton_link(*skeleton)?;
+            let number = links.iter().position(|other| *other == link).ok_or("a skeleton's link is not of its body")?;
+            let number = u16::try_from(number).map_err(|_| "a skin has at most 65536 joints")?;
+            let at = numbers[..count].iter().position(|other| *other == number).unwrap_or(count);
+            count = count.max(at + 1);
+            numbers[at] = number;
+            sums[at] += *part as f32;
+        }
+        joints.push(numbers);
+        weights.push(sums);
+    }
+    Ok((joints, weights))
+}
+
 fn animate(playback: &mut Playback, list: &[u32], options: &Options, output: &Path) -> Outcome<()> {
-    let (mut glb, mut tracks) = (glb::Glb::new(), Vec::<Track>::new());
+    let (mut glb, mut bound, mut tracks) = (glb::Glb::new(), Vec::<BodyId>::new(), Vec::<Track>::new());
     let times = list.iter().map(|frame| playback.time(*frame)).collect::<Result<Vec<_>, _>>()?;
     let desc = MeshDesc { cell_size: cell(options), deformation: options.view.deformation };
     let mut index = 0;
@@ -280,22 +315,16 @@ fn animate(playback: &mut Playback, list: &[u32], options: &Options, output: &Pa
                     let node = glb.node(&format!("{} at {time} s", name(body)), mesh, &Pose::default());
                     glb.show_between(node, time, next, times[0]);
                 }
-                continue;
+            } else if !bound.contains(&body) {
+                let made = bind(&mut glb, world, body, desc.cell_size, colour)?;
+                bound.extend((!made.is_empty()).then_some(body));
+                tracks.extend(made);
             }
-            for link in world.body_links(body)? {
-                let pose = world.link_state(link)?.pose;
-                let at = match tracks.iter().position(|track| track.link == link) {
-                    Some(at) => at,
-                    None => {
-                        let mesh = link_mesh(world, body, link, desc.cell_size)?;
-                        let Some(mesh) = glb.mesh(&mesh, &pose, colour) else { continue };
-                        let node = glb.node(&format!("{} link{}", name(body), link.raw.index), mesh, &pose);
-                        tracks.push(Track { link, node, times: Vec::new(), poses: Vec::new() });
-                        tracks.len() - 1
-                    }
-                };
-                tracks[at].times.push(time);
-                tracks[at].poses.push(pose);
+        }
+        for Track { link, times, poses, .. } in &mut tracks {
+            if let Ok(state) = world.link_state(*link) {
+                times.push(time);
+                poses.push(state.pose);
             }
         }
         Ok(())
@@ -306,4 +335,140 @@ fn animate(playback: &mut Playback, list: &[u32], options: &Options, output: &Pa
         }
     }
     Ok(glb.write(output)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use isocoat::world::{BodyDesc, LinkDesc, Recorder, RecorderDesc, SkeletonDesc, WorldDesc};
+    use nalgebra::{Matrix4, Point3, Quaternion, Translation3, UnitQuaternion};
+
+    const TIMES: [f64; 3] = [0.0, 0.5, 1.0];
+
+    /// An arm of two links, of which the second turns by half a right angle a frame, and a ball that flies.
+    fn arm_and_ball(frame: usize, world: &mut World, links: &[LinkId]) {
+        let angle = std::f64::consts::FRAC_PI_4 * frame as f64;
+        let mut state = world.link_state(links[1]).unwrap();
+        state.pose.rotation = UnitQuaternion::from_axis_angle(&Vec3::y_axis(), angle);
+        world.set_link_state(links[1], &state).unwrap();
+        let mut state = world.link_state(links[2]).unwrap();
+        state.pose.position = Vec3::new(0.0, 1.0, frame as f64);
+        world.set_link_state(links[2], &state).unwrap();
+    }
+
+    fn recording() -> Playback {
+        let mut world = World::new(WorldDesc::default()).unwrap();
+        let (arm, ball) =
+            (world.create_body(BodyDesc::default()).unwrap(), world.create_body(BodyDesc::default()).unwrap());
+        let mut links = Vec::new();
+        for (body, place, shape) in [
+            (arm, Pose::default(), Shape::segment(Vec3::zeros(), Vec3::new(0.4, 0.0, 0.0))),
+            (arm, Pose::at(0.4, 0.0, 0.0), Shape::segment(Vec3::zeros(), Vec3::new(0.4, 0.0, 0.0))),
+            (ball, Pose::at(0.0, 1.0, 0.0), Shape::Point(Vec3::zeros())),
+        ] {
+            let link = world.create_link(body, LinkDesc { pose: place, ..LinkDesc::default() }).unwrap();
+            world.create_skeleton(link, SkeletonDesc { shape, thickness: 0.1, ..SkeletonDesc::default() }).unwrap();
+            links.push(link);
+        }
+        let mut recorder = Recorder::new(RecorderDesc::default()).unwrap();
+        for (frame, time) in TIMES.into_iter().enumerate() {
+            arm_and_ball(frame, &mut world, &links);
+            recorder.capture(&world, time).unwrap();
+        }
+        Playback::open(recorder.bytes().unwrap()).unwrap()
+    }
+
+    /// The file of a recording, read back: the document and its binary part.
+    fn animated() -> (gltf::Gltf, Vec<u8>) {
+        let path = std::env::temp_dir().join(format!("isocoat-view-{}.glb", std::process::id()));
+        let options = Options { cell: Some(0.03), ..Options::default() };
+        animate(&mut recording(), &[0, 1, 2], &options, &path).unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        std::fs::remove_file(&path).unwrap();
+        let mut read = gltf::Gltf::from_slice(&bytes).unwrap();
+        let blob = read.blob.take().unwrap();
+        (read, blob)
+    }
+
+    fn matrix(translation: [f32; 3], [x, y, z, w]: [f32; 4]) -> Matrix4<f32> {
+        let turn = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
+        Translation3::from(translation).to_homogeneous() * turn.to_homogeneous()
+    }
+
+    /// Where a node is at a key frame: by its channels, or where it rests.
+    fn place(read: &gltf::Gltf, blob: &[u8], node: &gltf::Node, key: usize) -> Matrix4<f32> {
+        let (mut translation, mut rotation, _) = node.transform().decomposed();
+        for channel in read.animations().flat_map(|animation| animation.channels().collect::<Vec<_>>()) {
+            if channel.target().node().index() != node.index() {
+                continue;
+            }
+            let reader = channel.reader(|_| Some(blob));
+            assert_eq!(reader.read_inputs().unwrap().collect::<Vec<_>>(), TIMES.map(|time| time as f32));
+            match reader.read_outputs().unwrap() {
+                gltf::animation::util::ReadOutputs::Translations(mut list) => translation = list.nth(key).unwrap(),
+                gltf::animation::util::ReadOutputs::Rotations(list) => rotation = list.into_f32().nth(key).unwrap(),
+                _ => panic!("links have one size"),
+            }
+        }
+        matrix(translation, rotation)
+    }
+
+    #[test]
+    fn a_body_of_many_links_is_one_mesh_that_its_joints_carry() {
+        let (read, blob) = animated();
+        let node = read.nodes().find(|node| node.skin().is_some()).unwrap();
+        let skin = node.skin().unwrap();
+        let joints: Vec<_> = skin.joints().collect();
+        let inverse: Vec<_> = skin.reader(|_| Some(&blob)).read_inverse_bind_matrices().unwrap().collect();
+        assert_eq!((joints.len(), inverse.len()), (2, 2));
+        let primitive = node.mesh().unwrap().primitives().next().unwrap();
+        let reader = primitive.reader(|_| Some(&blob));
+        let positions: Vec<_> = reader.read_positions().unwrap().map(Point3::<f32>::from).collect();
+        let numbers: Vec<_> = reader.read_joints(0).unwrap().into_u16().collect();
+        let weights: Vec<_> = reader.read_weights(0).unwrap().into_f32().collect();
+        assert_eq!((numbers.len(), weights.len()), (positions.len(), positions.len()));
+        let (mut mixed, mut turned) = (0, 0);
+        for key in 0..TIMES.len() {
+            let carried: Vec<Matrix4<f32>> = joints
+                .iter()
+                .zip(&inverse)
+                .map(|(joint, inverse)| place(&read, &blob, joint, key) * Matrix4::from(*inverse))
+                .collect();
+            for ((p, numbers), weights) in positions.iter().zip(&numbers).zip(&weights) {
+                assert!((weights.iter().sum::<f32>() - 1.0).abs() < 1e-5);
+                let parts = numbers.iter().zip(weights);
+                let blend: Matrix4<f32> = parts.map(|(joint, weight)| carried[usize::from(*joint)] * *weight).sum();
+                let moved = blend.transform_point(p);
+                // As bound at the first key; later the end of the arm has turned about the elbow, the shoulder not.
+                let angle = std::f32::consts::FRAC_PI_4 * key as f32;
+                let turn = UnitQuaternion::from_axis_angle(&nalgebra::Vector3::y_axis(), angle);
+                let elbow = nalgebra::Vector3::new(0.4, 0.0, 0.0);
+                let expected = match p.x {
+                    _ if key == 0 => *p,
+                    x if x < 0.1 => *p,
+                    x if x > 0.7 => turn * (p - elbow) + elbow,
+                    _ => {
+                        mixed += usize::from(weights[1] > 0.1);
+                        continue;
+                    }
+                };
+                turned += usize::from(key > 0 && p.x > 0.7);
+                assert!((moved - expected).norm() < 1e-5, "key {key}: {p} {moved} {expected}");
+            }
+        }
+        assert!(mixed > 50 && turned > 50, "{mixed} {turned}");
+    }
+
+    #[test]
+    fn a_body_of_one_link_moves_as_a_node() {
+        let (read, blob) = animated();
+        let node = read.nodes().find(|node| node.mesh().is_some() && node.skin().is_none()).unwrap();
+        for key in 0..TIMES.len() {
+            let expected = matrix([0.0, 1.0, key as f32], [0.0, 0.0, 0.0, 1.0]);
+            assert!((place(&read, &blob, &node, key) - expected).norm() < 1e-6);
+        }
+        let primitive = node.mesh().unwrap().primitives().next().unwrap();
+        let positions = primitive.reader(|_| Some(&blob)).read_positions().unwrap();
+        assert!(positions.into_iter().all(|p| (Point3::<f32>::from(p).coords.norm() - 0.1).abs() < 1e-4));
+    }
 }
