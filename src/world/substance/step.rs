@@ -141,6 +141,7 @@ impl World {
                 viscosity: desc.viscosity,
                 damping: desc.damping,
                 fusion_threshold: desc.fusion_threshold,
+                inverse_width: 1.0 / (profile.radius - profile.thickness),
                 half: profile.distance_of_level(0.5 * profile.isovalue),
                 farthest: profile.distance_of_level(profile.isovalue / CROWD),
                 profile,
