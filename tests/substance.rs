@@ -504,6 +504,120 @@ fn a_restored_substance_goes_on_with_the_same_bits() {
     }
 }
 
+/// A world whose bodies may sleep, with a lump that lies on the ground and is asleep.
+fn one_asleep() -> (World, BodyId, BodyId) {
+    let mut world = world(G);
+    world.set_desc(WorldDesc { sleep_time: 0.25, sleep_speed: 0.5, ..world.desc().clone() }).unwrap();
+    let floor = ground(&mut world);
+    let body = lump(&mut world, clay(0.05), &ball(Vec3::new(0.0, 0.0, 0.12), 0.12));
+    let fell = (0..600).position(|_| {
+        world.step(1.0 / 60.0).unwrap();
+        !world.body_is_awake(body).unwrap()
+    });
+    println!("asleep after {:?} steps", fell);
+    assert!(fell.is_some());
+    (world, floor, body)
+}
+
+#[test]
+fn a_substance_at_rest_falls_asleep_and_does_not_move_any_more() {
+    let (mut world, _, body) = one_asleep();
+    let (before, contacts) = (world.particles(body).unwrap().to_vec(), world.contacts().to_vec());
+    assert!(momentum(&world, body).0 == Vec3::zeros() && !contacts.is_empty());
+    let weight = G * before.len() as f64 * world.substance_desc(body).unwrap().particle_mass;
+    assert!((contacts[0].force.z / weight + 1.0).abs() < 0.2, "{}", contacts[0].force.z / weight);
+    let mut bytes = Vec::new();
+    world.snapshot(&mut bytes);
+    let mut other = World::new(WorldDesc::default()).unwrap();
+    other.restore(&bytes).unwrap();
+    for world in [&mut world, &mut other] {
+        let there = world.bodies().nth(1).unwrap();
+        for _ in 0..30 {
+            world.step(1.0 / 60.0).unwrap();
+            assert_eq!((world.counters().asleep, world.counters().substeps), (1, 0));
+        }
+        assert_eq!(world.particles(there).unwrap(), before);
+        assert_eq!(world.contacts().len(), contacts.len());
+        assert_eq!(world.contacts()[0].force, contacts[0].force);
+    }
+    // Both wake to the same bits.
+    for world in [&mut world, &mut other] {
+        let there = world.bodies().nth(1).unwrap();
+        world.wake_body(there).unwrap();
+        (0..5).for_each(|_| world.step(1.0 / 60.0).unwrap());
+    }
+    let there = other.bodies().nth(1).unwrap();
+    assert_eq!(world.particles(body).unwrap(), other.particles(there).unwrap());
+}
+
+#[test]
+fn whatever_touches_or_changes_a_substance_wakes_it() {
+    type Touch = (&'static str, fn(&mut World, BodyId, BodyId));
+    let touches: [Touch; 6] = [
+        ("a force", |world, _, body| {
+            let first = world.particles(body).unwrap()[0].id;
+            world.add_particle_forces(body, &[first], &[[0.0, 0.0, 1.0]]).unwrap();
+        }),
+        ("a velocity", |world, _, body| {
+            let first = world.particles(body).unwrap()[0].id;
+            world.set_particles(body, &[first], None, Some(&[[0.0, 0.0, 1.0]])).unwrap();
+        }),
+        ("the ground changes", |world, floor, _| {
+            let desc = world.body_desc(floor).unwrap().clone();
+            world.set_body_desc(floor, BodyDesc { friction: 0.1, ..desc }).unwrap();
+        }),
+        ("the ground goes", |world, floor, _| world.destroy_body(floor).unwrap()),
+        ("a new body beside it", |world, _, _| {
+            tool(world, Vec3::new(0.0, 0.0, 0.3), Vec3::repeat(0.05), 0.02, 0.5);
+        }),
+        ("another substance", |world, _, _| {
+            lump(world, clay(0.05), &ball(Vec3::new(0.0, 0.0, 0.32), 0.06));
+        }),
+    ];
+    for (what, touch) in touches {
+        let (mut world, floor, body) = one_asleep();
+        touch(&mut world, floor, body);
+        world.step(1.0 / 60.0).unwrap();
+        assert!(world.body_is_awake(body).unwrap(), "{what}");
+        if what == "the ground goes" {
+            let fall = world.particles(body).unwrap().iter().map(|p| p.velocity.z).sum::<f64>();
+            let count = world.particles(body).unwrap().len() as f64;
+            assert!((fall / count + G / 60.0).abs() < 1e-9, "nothing carries it: {}", fall / count);
+        }
+    }
+}
+
+/// What comes from afar wakes it before the two touch, and is slowed down by it.
+#[test]
+fn a_ball_that_falls_on_a_substance_wakes_it_in_time() {
+    let (mut world, floor, body) = one_asleep();
+    assert!(world.body_is_awake(floor).unwrap());
+    let ball = world.create_body(BodyDesc { rigid: true, ..BodyDesc::default() }).unwrap();
+    let kind = Kind::Rigid;
+    let pose = isocoat::math::Pose::at(0.0, 0.0, 1.2);
+    let link =
+        LinkDesc { kind, mass: 0.2, inertia: isocoat::math::Mat3::identity() * 3e-4, pose, ..LinkDesc::default() };
+    let link = world.create_link(ball, link).unwrap();
+    let shape = Shape::Point(Vec3::zeros());
+    world.create_skeleton(link, SkeletonDesc { shape, thickness: 0.06, ..SkeletonDesc::default() }).unwrap();
+    let top = world.particles(body).unwrap().iter().map(|p| p.position.z).fold(0.0, f64::max);
+    let (mut woke, mut slowed) = (None, false);
+    for step in 0..60 {
+        let before = world.link_state(link).unwrap();
+        world.step(1.0 / 60.0).unwrap();
+        let reach = before.pose.position.z + before.twist.linear.z / 60.0 - 0.06 - top;
+        if woke.is_none() && world.body_is_awake(body).unwrap() {
+            woke = Some(reach);
+        }
+        let lost = G * (step + 1) as f64 / 60.0 + world.link_state(link).unwrap().twist.linear.z;
+        assert!(woke.is_some() || lost.abs() < 1e-9, "it falls freely until then");
+        slowed |= lost > 1.0;
+    }
+    println!("woke when the ball came as near as {woke:?} m");
+    assert!(woke.is_some_and(|gap| (0.0..0.3).contains(&gap)), "before they touch: {woke:?}");
+    assert!(slowed, "the substance holds it");
+}
+
 /// Moves a host-driven link with this velocity for a step.
 fn drive(world: &mut World, link: LinkId, velocity: Vec3) {
     let mut desc = world.link_desc(link).unwrap().clone();

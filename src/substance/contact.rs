@@ -10,7 +10,7 @@
 
 use std::f64::consts::TAU;
 
-use super::locale::Locale;
+use super::locale::{Locale, round_sector};
 use crate::contact::pair::Side;
 use crate::math::{Vec3, tangents};
 
@@ -174,6 +174,13 @@ impl Fan<'_, '_> {
         (r < self.radius * (1.0 - 1e-6) && along < 0.0).then_some((r, gradient / along))
     }
 
+    /// `σ` on the surface along a ray.
+    fn sum(&self, u: &Vec3, guess: f64) -> Option<f64> {
+        let (r, _) = self.root(u, guess)?;
+        let (_, wb, _) = self.stiffness.weights();
+        Some((self.locale.own(&(self.center + u * r)) - self.isovalue) / wb)
+    }
+
     fn node(&mut self, u: &Vec3, guess: f64) -> Option<(f64, Node)> {
         let (r, area) = self.root(u, guess)?;
         let p = self.center + u * r;
@@ -262,10 +269,13 @@ pub fn press(
     // Square of the distance from the axis, on the plane at the foot.
     let height = foot.max(CLOSEST * thickness);
     let half_angle = libm::acos((fan.straight / radius).clamp(0.0, 1.0)) + libm::acos(axis.dot(&straight).min(1.0));
-    let farthest = (height * libm::tan(half_angle.min(WIDEST))).powi(2);
+    let half_angle = half_angle.min(WIDEST);
+    let farthest = (height * libm::tan(half_angle)).powi(2);
     if farthest <= 0.0 {
         return press;
     }
+    let (middle, ball) = round_sector(&straight, libm::cos(half_angle), radius);
+    fan.locale.narrow(&(center + middle), ball);
     let normal = first.area.normalize();
     let (e1, e2) = tangents(&straight);
     let (mut total, mut moment) = (0.0, Vec3::zeros());
@@ -276,17 +286,21 @@ pub fn press(
     for meridian in 0..meridians {
         let (sine, cosine) = libm::sincos(TAU * meridian as f64 / meridians as f64);
         let outwards = e1 * cosine + e2 * sine;
-        let mut at = |q: f64| {
+        let ray = |q: f64| {
             let across = axis * height + outwards * q.sqrt();
             let length = across.norm();
             let u = across / length;
-            let guess = foot * normal.dot(&axis) / normal.dot(&u).max(0.1);
-            fan.node(&u, guess).map(|(_, node)| (node, height / (length * length * length)))
+            (u, foot * normal.dot(&axis) / normal.dot(&u).max(0.1), length)
         };
-        let sum_at = |node: &Option<(Node, f64)>| node.as_ref().map_or(-isovalue, |(node, _)| node.sum);
-        let Some((from, to)) = positive_part(first.sum, farthest, |q| sum_at(&at(q))) else { continue };
+        let sum_at = |q: f64| {
+            let (u, guess, _) = ray(q);
+            fan.sum(&u, guess).unwrap_or(-isovalue)
+        };
+        let Some((from, to)) = positive_part(first.sum, farthest, sum_at) else { continue };
         for (x, weight) in NODES {
-            let Some((node, angle)) = at(from + (to - from) * x) else { continue };
+            let (u, guess, length) = ray(from + (to - from) * x);
+            let Some((_, node)) = fan.node(&u, guess) else { continue };
+            let angle = height / (length * length * length);
             if node.sum <= 0.0 {
                 continue;
             }

@@ -22,17 +22,20 @@ pub struct Law {
     cohesion: f64,
     /// `F(r_c)`.
     shift: f64,
-    /// Potential at the cut, and where the line begins: distance, force and stiffness there.
+    /// Stiffness at rest, the most beyond `r_0` \[N/m\].
+    rest: f64,
+    /// Where the force ends, and where the line begins: distance, force and stiffness there.
     cut: f64,
     hard: f64,
     hard_force: f64,
     hard_stiffness: f64,
 }
 
-/// `F(r)` and `-F'(r)` without the shift.
-fn bare(spacing: f64, cohesion: f64, r: f64) -> (f64, f64) {
-    let inverse = 1.0 / r;
-    let u4 = (spacing * inverse).powi(4);
+/// `F(r)` and `-F'(r)` without the shift, from `1 / r`.
+#[inline(always)]
+fn bare(spacing: f64, cohesion: f64, inverse: f64) -> (f64, f64) {
+    let u2 = (spacing * inverse) * (spacing * inverse);
+    let u4 = u2 * u2;
     let scale = cohesion * inverse;
     (scale * (u4 * u4 - u4), scale * inverse * (9.0 * u4 * u4 - 5.0 * u4))
 }
@@ -44,8 +47,10 @@ impl Law {
         // What cannot be followed in time is made softer, as little as needed.
         let rest = 4.0 * cohesion / (spacing * spacing);
         let cohesion = if rest > most { cohesion * most / rest } else { cohesion };
-        let (shift, _) = bare(spacing, cohesion, CUT * REST * spacing);
-        let stiffness = |r: f64| bare(spacing, cohesion, r).1;
+        let rest = 4.0 * cohesion / (spacing * spacing);
+        let cut = CUT * REST * spacing;
+        let (shift, _) = bare(spacing, cohesion, 1.0 / cut);
+        let stiffness = |r: f64| bare(spacing, cohesion, 1.0 / r).1;
         let (mut hard, mut soft) = (HARDEST * spacing, spacing);
         if stiffness(hard) > most {
             for _ in 0..60 {
@@ -58,8 +63,8 @@ impl Law {
             }
             hard = soft;
         }
-        let (force, hard_stiffness) = bare(spacing, cohesion, hard);
-        Self { spacing, cohesion, shift, cut: CUT * REST * spacing, hard, hard_force: force - shift, hard_stiffness }
+        let (force, hard_stiffness) = bare(spacing, cohesion, 1.0 / hard);
+        Self { spacing, cohesion, shift, rest, cut, hard, hard_force: force - shift, hard_stiffness }
     }
 
     /// The strength that it has: less than asked for where that could not be followed \[J\].
@@ -67,14 +72,15 @@ impl Law {
         self.cohesion
     }
 
-    /// Repulsion at a distance below the cut \[N\], and the most that its stiffness is up to there \[N/m\].
-    pub fn push(&self, r: f64) -> (f64, f64) {
-        if r < self.hard {
-            return (self.hard_force + self.hard_stiffness * (self.hard - r), self.hard_stiffness);
-        }
-        let (force, stiffness) = bare(self.spacing, self.cohesion, r);
-        let rest = 4.0 * self.cohesion / (self.spacing * self.spacing);
-        (force - self.shift, if r < self.spacing { stiffness } else { rest })
+    /// Repulsion at a distance below the cut \[N\], and the most that its stiffness is up to there \[N/m\]; `inverse` is one
+    /// over the distance.
+    #[inline(always)]
+    pub fn push(&self, r: f64, inverse: f64) -> (f64, f64) {
+        // Both are worked out, so that several at a time can be.
+        let line = self.hard_force + self.hard_stiffness * (self.hard - r);
+        let (force, stiffness) = bare(self.spacing, self.cohesion, inverse);
+        let stiffness = if r < self.spacing { stiffness } else { self.rest };
+        if r < self.hard { (line, self.hard_stiffness) } else { (force - self.shift, stiffness) }
     }
 
     /// Potential energy of a pair \[J\]: zero at the cut.
@@ -97,12 +103,15 @@ impl Law {
 pub fn direction(a: &Vec3, b: &Vec3, numbers: [u32; 2]) -> (Vec3, f64) {
     let offset = b - a;
     let distance = offset.norm();
-    if distance > 0.0 {
-        return (offset * (1.0 / distance), distance);
-    }
+    if distance > 0.0 { (offset / distance, distance) } else { (parting(numbers), 0.0) }
+}
+
+/// The direction in which two at one point part.
+#[cold]
+pub fn parting(numbers: [u32; 2]) -> Vec3 {
     let angle = f64::from(numbers[0] ^ numbers[1].rotate_left(7)) * 2.399_963_229_728_653;
     let (sine, cosine) = libm::sincos(angle);
-    (Vec3::new(0.8 * cosine, 0.8 * sine, 0.6), 0.0)
+    Vec3::new(0.8 * cosine, 0.8 * sine, 0.6)
 }
 
 /// What is left of the speed of approach of a pair after `h` seconds of friction, `v' = -w (c + μ |v|) v` with `w` one over
@@ -118,27 +127,25 @@ mod tests {
     #[test]
     fn the_force_is_the_slope_of_the_energy_and_ends_at_the_cut() {
         let law = Law::new(0.2, 3.0, f64::INFINITY);
+        let push = |r: f64| law.push(r, 1.0 / r);
         for r in [0.02, 0.1, 0.135, 0.15, 0.19, 0.2, 0.22, 0.3, 0.312] {
             let h = 1e-6;
             let slope = (law.energy(r - h) - law.energy(r + h)) / (2.0 * h);
-            assert!(
-                (slope - law.push(r).0).abs() < 1e-5 * law.push(r).0.abs().max(1.0),
-                "{r}: {slope} {}",
-                law.push(r).0
-            );
-            assert!(law.push(r).1 >= (law.push(r - h).0 - law.push(r + h).0) / (2.0 * h) * (1.0 - 1e-6));
+            assert!((slope - push(r).0).abs() < 1e-5 * push(r).0.abs().max(1.0), "{r}: {slope} {}", push(r).0);
+            assert!(push(r).1 >= (push(r - h).0 - push(r + h).0) / (2.0 * h) * (1.0 - 1e-6));
         }
-        assert!(law.push(0.2).0.abs() < 1e-12, "at rest at the spacing");
-        assert!(law.push(CUT * 0.2).0.abs() < 1e-12 && law.energy(CUT * 0.2).abs() < 1e-12);
+        assert!(push(0.2).0.abs() < 1e-12, "at rest at the spacing");
+        assert!(push(CUT * 0.2).0.abs() < 1e-12 && law.energy(CUT * 0.2).abs() < 1e-12);
     }
 
     #[test]
     fn a_bound_of_the_stiffness_holds_everywhere() {
         for most in [1.0, 299.0, 301.0, 5000.0] {
             let law = Law::new(0.2, 3.0, most);
+            let push = |r: f64| law.push(r, 1.0 / r);
             for k in 1..400 {
                 let (r, h) = (k as f64 * 8e-4, 1e-7);
-                let stiffness = (law.push(r - h).0 - law.push(r + h).0) / (2.0 * h);
+                let stiffness = (push(r - h).0 - push(r + h).0) / (2.0 * h);
                 assert!(stiffness <= most * (1.0 + 1e-4), "{most} at {r}: {stiffness}");
             }
         }

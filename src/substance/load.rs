@@ -7,6 +7,7 @@ use super::swarm::Swarm;
 use crate::base::Motion;
 use crate::contact::pair::Side;
 use crate::contact::press::Material;
+use crate::field::Placed;
 use crate::math::Vec3;
 
 /// Motion of a contact after which it is integrated again, over the thickness.
@@ -21,6 +22,28 @@ pub struct Obstacle {
     pub side: Side,
     /// For each matter, what the two make of their surfaces; none where they do not touch.
     pub materials: Vec<Option<Material>>,
+    /// For each skeleton, the lowest and the highest place of a particle that it may meet.
+    bounds: Vec<(Vec3, Vec3)>,
+}
+
+impl Obstacle {
+    /// Learns where its skeletons may meet particles whose fields reach this far.
+    pub fn bound(&mut self, reach: f64) {
+        let meets = |skeleton: &Placed| skeleton.shape.bounds(skeleton.profile.radius + reach);
+        self.bounds.clear();
+        self.bounds.extend(self.side.skeletons.iter().map(meets));
+    }
+
+    /// Skeletons whose fields may come within `reach` of a place, not more than it was bounded for.
+    pub fn near(&self, p: &Vec3, reach: f64) -> impl Iterator<Item = u32> {
+        (0_u32..).zip(self.side.skeletons.iter().zip(&self.bounds)).filter_map(
+            move |(index, (skeleton, (low, high)))| {
+                let is_within = (0..3).all(|axis| low[axis] <= p[axis] && p[axis] <= high[axis]);
+                let is_near = is_within && skeleton.shape.closest(p).distance < skeleton.profile.radius + reach;
+                is_near.then_some(index)
+            },
+        )
+    }
 }
 
 /// Who presses on a particle.
@@ -170,7 +193,7 @@ impl Load {
             Other::Piece { label, nearest } => {
                 let other = swarm.matter_of(*nearest as usize);
                 self.link = u32::MAX;
-                locale.gather(swarm, i, Some(*label), f64::INFINITY);
+                locale.gather(swarm, i, Some(*label), &center, f64::INFINITY);
                 // Towards those of the piece that are near, the nearest above all.
                 let mut axis = Vec3::zeros();
                 for j in swarm.near.of(i).iter().map(|j| *j as usize).filter(|j| swarm.label[*j] == *label) {
@@ -189,7 +212,7 @@ impl Load {
             }
         };
         if matches!(opposite, Opposite::Coat(..)) {
-            locale.gather(swarm, i, None, f64::INFINITY);
+            locale.gather(swarm, i, None, &center, f64::INFINITY);
         }
         self.press = contact::press(locale, center, axis, guess, sizes, stiffness, &opposite);
         self.carriers.clear();

@@ -12,6 +12,7 @@
 use std::sync::atomic::{Ordering, compiler_fence};
 
 use super::swarm::{Matter, Swarm};
+use crate::field::Profile;
 use crate::field::lanes::{Dispatch, Kernel, Lanes};
 use crate::math::Vec3;
 
@@ -29,9 +30,20 @@ struct Block {
     isovalue: Lanes<WIDTH>,
 }
 
+/// One particle of a [`Block`].
+struct One {
+    place: Vec3,
+    radius: f64,
+    inverse_width: f64,
+    isovalue: f64,
+}
+
 const ZERO: Lanes<WIDTH> = Lanes([0.0; WIDTH]);
 
-/// Eight that have no field.
+/// One that has no field.
+const NO_ONE: One = One { place: Vec3::new(1e30, 0.0, 0.0), radius: 0.0, inverse_width: 0.0, isovalue: 0.0 };
+
+/// Eight of these.
 const NOBODY: Block =
     Block { place: [Lanes([1e30; WIDTH]), ZERO, ZERO], radius: ZERO, inverse_width: ZERO, isovalue: ZERO };
 
@@ -51,19 +63,35 @@ impl Group {
         self.indices.clear();
     }
 
+    /// Lets go of those who have no field in a ball, but for the first one.
+    fn narrow(&mut self, center: &Vec3, radius: f64) {
+        let count = self.indices.len();
+        let mut kept = 0;
+        for k in 0..count {
+            let one = self.blocks[k / WIDTH].lane(k % WIDTH);
+            let reach = radius + one.radius;
+            if k == 0 || (one.place - center).norm_squared() <= reach * reach {
+                self.blocks[kept / WIDTH].set_lane(kept % WIDTH, &one);
+                self.indices[kept] = self.indices[k];
+                kept += 1;
+            }
+        }
+        self.indices.truncate(kept);
+        self.blocks.truncate(kept.div_ceil(WIDTH));
+        for k in kept..self.blocks.len() * WIDTH {
+            self.blocks[k / WIDTH].set_lane(k % WIDTH, &NO_ONE);
+        }
+    }
+
     fn add(&mut self, index: u32, place: &Vec3, offset: f64, matter: &Matter) {
         let lane = self.indices.len() % WIDTH;
         if lane == 0 {
             self.blocks.push(NOBODY);
         }
         let Some(block) = self.blocks.last_mut() else { return };
-        let profile = &matter.profile;
-        for (axis, column) in block.place.iter_mut().enumerate() {
-            column.0[lane] = place[axis];
-        }
-        block.radius.0[lane] = profile.radius + offset;
-        block.inverse_width.0[lane] = 1.0 / (profile.radius - profile.thickness);
-        block.isovalue.0[lane] = profile.isovalue;
+        let Profile { radius, isovalue, .. } = matter.profile;
+        let one = One { place: *place, radius: radius + offset, inverse_width: matter.inverse_width, isovalue };
+        block.set_lane(lane, &one);
         self.indices.push(index);
     }
 
@@ -124,6 +152,24 @@ impl<const GRADIENT: bool> Kernel for Sums<'_, GRADIENT> {
 }
 
 impl Block {
+    fn lane(&self, lane: usize) -> One {
+        One {
+            place: Vec3::new(self.place[0].0[lane], self.place[1].0[lane], self.place[2].0[lane]),
+            radius: self.radius.0[lane],
+            inverse_width: self.inverse_width.0[lane],
+            isovalue: self.isovalue.0[lane],
+        }
+    }
+
+    fn set_lane(&mut self, lane: usize, one: &One) {
+        for (column, x) in self.place.iter_mut().zip(one.place.iter()) {
+            column.0[lane] = *x;
+        }
+        self.radius.0[lane] = one.radius;
+        self.inverse_width.0[lane] = one.inverse_width;
+        self.isovalue.0[lane] = one.isovalue;
+    }
+
     /// Each one's field, and its gradient if asked for. One loop over all of it becomes vector instructions; operations on
     /// whole [`Lanes`] become them in part only.
     #[inline(always)]
@@ -250,6 +296,17 @@ fn along_one(
     }
 }
 
+/// Centre and radius of a ball round all who are at most this far from the origin, in directions that make an angle with
+/// the unit vector `axis` whose cosine is at least this.
+pub fn round_sector(axis: &Vec3, cosine: f64, length: f64) -> (Vec3, f64) {
+    if cosine <= 0.0 {
+        return (Vec3::zeros(), length);
+    }
+    // Through the rim; of a narrow sector, through the origin too.
+    let middle = length * cosine.min(0.5 / cosine);
+    (axis * middle, middle.max(length * (1.0 - cosine * cosine).max(0.0).sqrt()))
+}
+
 /// The field round one particle.
 #[derive(Debug, Default)]
 pub struct Locale {
@@ -263,29 +320,40 @@ pub struct Locale {
     /// Where each particle is in `other`, for those with the number of this gathering.
     places: Vec<(u64, u32)>,
     gathering: u64,
-    reach: f64,
     own_values: Vec<f64>,
     other_values: Vec<f64>,
 }
 
 impl Locale {
-    /// Gathers who is near particle `index`, up to `reach` away: those of its label, and those of label `rival`, or of all
-    /// other labels to which there are bonds when that is none.
-    pub fn gather(&mut self, swarm: &Swarm, index: usize, rival: Option<u32>, reach: f64) {
+    fn clear(&mut self) {
         self.own.clear();
         self.other.clear();
         self.bonds.clear();
         self.bond_starts.clear();
-        self.reach = reach;
+    }
+
+    /// Gathers particle `index` and some of its label, whose fields add up to the whole one at most.
+    pub fn gather_only(&mut self, swarm: &Swarm, index: usize, others: impl Iterator<Item = usize>) {
+        self.clear();
+        for j in std::iter::once(index).chain(others) {
+            self.own.add(j as u32, &swarm.place[j], swarm.offset[j], swarm.matter_of(j));
+        }
+    }
+
+    /// Gathers particle `index` and who near it has a field in a ball: those of its label, and those of label `rival`, or
+    /// of all other labels to which there are bonds when that is none.
+    pub fn gather(&mut self, swarm: &Swarm, index: usize, rival: Option<u32>, center: &Vec3, radius: f64) {
+        self.clear();
         let add = |group: &mut Group, j: usize| {
             group.add(j as u32, &swarm.place[j], swarm.offset[j], swarm.matter_of(j));
         };
         let label = swarm.label[index];
         add(&mut self.own, index);
         let mut bonded = swarm.is_bonded(index);
+        let reach = radius + swarm.widest;
         for j in swarm.near.of(index) {
             let j = *j as usize;
-            if (swarm.place[j] - swarm.place[index]).norm_squared() > reach * reach {
+            if (swarm.place[j] - center).norm_squared() > reach * reach {
                 continue;
             }
             if swarm.label[j] == label {
@@ -300,6 +368,14 @@ impl Locale {
         }
         if bonded && !self.other.indices.is_empty() {
             self.gather_bonds(swarm);
+        }
+    }
+
+    /// Lets go of those who have no field in a ball that the particle is in; not of bonds.
+    pub fn narrow(&mut self, center: &Vec3, radius: f64) {
+        if !self.is_bonded() {
+            self.own.narrow(center, radius);
+            self.other.narrow(center, radius);
         }
     }
 
@@ -380,7 +456,7 @@ impl Locale {
             return;
         }
         // Bonds come and go within a part of a piece: a difference will do for the slope of theirs.
-        let step = 1e-6 * self.reach;
+        let step = 1e-6 * self.own.blocks[0].radius.0[0];
         for at in 0..on.r.len() {
             if on.value[at] <= 0.0 {
                 continue;

@@ -1,5 +1,6 @@
 //! Who is near whom, in O(n): a grid of cells as wide as the reach, kept as particles sorted by cell.
 
+use crate::field::lanes::{Dispatch, Kernel};
 use crate::math::Vec3;
 
 /// Cells along an axis: what lies farther out shares the last one.
@@ -13,10 +14,61 @@ pub struct Neighbours {
     lists: Vec<u32>,
     /// Cell and particle, in order.
     cells: Vec<(u64, u32)>,
-    /// Their places, in the same order.
-    places: Vec<Vec3>,
+    /// Those in the cells round one.
+    around: Around,
     /// Those near one particle.
     found: Vec<u32>,
+}
+
+/// Particles in the cells round one, which all of this cell look at.
+#[derive(Debug, Default)]
+struct Around {
+    numbers: Vec<u32>,
+    /// Their places, by axis.
+    places: [Vec<f64>; 3],
+    /// Squares of their distances from one of them.
+    squares: Vec<f64>,
+}
+
+impl Around {
+    fn clear(&mut self) {
+        self.numbers.clear();
+        self.places.iter_mut().for_each(Vec::clear);
+    }
+
+    fn add(&mut self, number: u32, place: &Vec3) {
+        self.numbers.push(number);
+        self.places.iter_mut().zip(place.iter()).for_each(|(column, x)| column.push(*x));
+    }
+
+    /// Finds all squares of distances from `p`, with the widest registers of this processor; the same bits with any.
+    fn look_from(&mut self, p: &Vec3) {
+        self.squares.resize(self.numbers.len(), 0.0);
+        Dispatch::best().run(Squares { p, places: &self.places, squares: &mut self.squares });
+    }
+}
+
+/// The arguments of [`Around::look_from`].
+struct Squares<'a> {
+    p: &'a Vec3,
+    places: &'a [Vec<f64>; 3],
+    squares: &'a mut [f64],
+}
+
+impl Kernel for Squares<'_> {
+    type Output = ();
+
+    /// A plain loop over columns: the compiler makes vectors of it.
+    #[inline(always)]
+    fn run<const W: usize>(self) {
+        let count = self.squares.len();
+        let [x, y, z] = self.places;
+        let (x, y, z) = (&x[..count], &y[..count], &z[..count]);
+        for at in 0..count {
+            let way = [x[at] - self.p.x, y[at] - self.p.y, z[at] - self.p.z];
+            self.squares[at] = way[0] * way[0] + way[1] * way[1] + way[2] * way[2];
+        }
+    }
 }
 
 /// The cell of a point, row by row along `x`.
@@ -27,7 +79,7 @@ fn key(cell: [i64; 3]) -> u64 {
 impl Neighbours {
     /// Finds all pairs up to `reach` apart.
     pub fn find(&mut self, points: &[Vec3], reach: f64) {
-        let Self { ranges, lists, cells, places, found } = self;
+        let Self { ranges, lists, cells, around, found } = self;
         let low = points.iter().fold(Vec3::repeat(f64::INFINITY), |low, p| low.inf(p));
         let cell_of = |p: &Vec3| {
             let at = (p - low) / reach;
@@ -36,43 +88,44 @@ impl Neighbours {
         cells.clear();
         cells.extend(points.iter().enumerate().map(|(index, p)| (key(cell_of(p)), index as u32)));
         cells.sort_unstable();
-        places.clear();
-        places.extend(cells.iter().map(|(_, index)| points[*index as usize]));
         ranges.clear();
         ranges.resize(points.len(), (0, 0));
         lists.clear();
-        // The particles of a cell share their nine rows of cells.
-        let mut rows = [(0, 0); 9];
         let mut first = 0;
         while first < cells.len() {
             let cell = cells[first].0;
             let last = first + cells[first..].partition_point(|(key, _)| *key == cell);
             let [x, y, z] = cell_of(&points[cells[first].1 as usize]);
-            for (row, range) in rows.iter_mut().enumerate() {
-                let (y, z) = (y + row as i64 % 3 - 1, z + row as i64 / 3 - 1);
-                *range = if (0..CELLS).contains(&y) && (0..CELLS).contains(&z) {
-                    let from = key([(x - 1).max(0), y, z]);
-                    let to = key([(x + 1).min(CELLS - 1), y, z]);
-                    let begin = cells.partition_point(|(key, _)| *key < from);
-                    (begin, begin + cells[begin..].partition_point(|(key, _)| *key <= to))
-                } else {
-                    (0, 0)
-                };
-            }
-            // One more: where somebody is written who may not count.
-            found.resize(rows.iter().map(|(from, to)| to - from).sum::<usize>() + 1, 0);
-            for (_, index) in &cells[first..last] {
-                let (p, begin) = (points[*index as usize], lists.len() as u32);
-                let mut count = 0;
-                for (from, to) in rows {
-                    for ((_, other), place) in cells[from..to].iter().zip(&places[from..to]) {
-                        // No branch that nobody can foresee.
-                        found[count] = *other;
-                        count += usize::from((place - p).norm_squared() <= reach * reach && other != index);
-                    }
+            around.clear();
+            // Where the cell's own begin among those around it.
+            let mut own = 0;
+            for row in 0..9 {
+                let (y, z) = (y + row % 3 - 1, z + row / 3 - 1);
+                if !(0..CELLS).contains(&y) || !(0..CELLS).contains(&z) {
+                    continue;
                 }
+                let from = key([(x - 1).max(0), y, z]);
+                let to = key([(x + 1).min(CELLS - 1), y, z]);
+                let begin = cells.partition_point(|(key, _)| *key < from);
+                let end = begin + cells[begin..].partition_point(|(key, _)| *key <= to);
+                if (begin..end).contains(&first) {
+                    own = around.numbers.len() + first - begin;
+                }
+                cells[begin..end].iter().for_each(|(_, index)| around.add(*index, &points[*index as usize]));
+            }
+            found.resize(around.numbers.len() + 1, 0);
+            for (at, (_, index)) in cells[first..last].iter().enumerate() {
+                around.look_from(&points[*index as usize]);
+                // Nobody is near itself.
+                around.squares[own + at] = f64::INFINITY;
+                let mut count = 0;
+                for (other, square) in around.numbers.iter().zip(&around.squares) {
+                    // No branch that nobody can foresee: who may not count is written too, and then over.
+                    found[count] = *other;
+                    count += usize::from(*square <= reach * reach);
+                }
+                ranges[*index as usize] = (lists.len() as u32, (lists.len() + count) as u32);
                 lists.extend_from_slice(&found[..count]);
-                ranges[*index as usize] = (begin, lists.len() as u32);
             }
             first = last;
         }

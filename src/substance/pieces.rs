@@ -14,7 +14,7 @@ use super::{Bond, Change, ParticleId, Substance};
 const FASTEST: f64 = 0.015;
 
 /// Sets that grow together.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Sets {
     parents: Vec<u32>,
 }
@@ -141,15 +141,18 @@ impl Substance {
     /// Parts of a label that hang together no more: all but the largest get labels of their own.
     fn split(&mut self, joined: &[[u32; 2]], reaching: &impl Fn(u32) -> Vec<u32>) {
         let count = self.particles.len();
-        let (mut alike, mut pieces) = (Sets::default(), Sets::default());
+        let mut alike = Sets::default();
         alike.reset(count);
-        pieces.reset(count);
+        let mut across = Vec::new();
         for [a, b] in joined {
-            pieces.join(*a, *b);
             if self.label_of(*a) == self.label_of(*b) {
                 alike.join(*a, *b);
+            } else {
+                across.push([*a, *b]);
             }
         }
+        let mut pieces = alike.clone();
+        across.into_iter().for_each(|[a, b]| pieces.join(a, b));
         let mut sizes = vec![0_u32; count];
         for place in 0..count as u32 {
             self.particles[place as usize].piece = pieces.find(place);

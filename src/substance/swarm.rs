@@ -30,6 +30,8 @@ pub struct Matter {
     pub fusion_threshold: f64,
     /// The field without an offset.
     pub profile: Profile,
+    /// One over the width of the field's outer piece \[1/m\].
+    pub inverse_width: f64,
     /// Where two particles of the same field make a solid together: its half way, without offsets \[m\].
     pub half: f64,
     /// No surface is farther from a particle, without offsets: there [`CROWD`] would have to add up \[m\].

@@ -87,7 +87,8 @@ impl System {
 
     /// Whether a rigid body is between two particles, the first of which has these loads: a knife cuts, however thin it is.
     pub fn is_cut(&self, loads: &[Load], a: usize, b: usize) -> bool {
-        let line = Shape::Segment(self.swarm.place[a], self.swarm.place[b]);
+        let (start, end) = (&self.swarm.place[a], &self.swarm.place[b]);
+        let line = Shape::Segment(*start, *end);
         loads.iter().any(|load| {
             let Other::Obstacle { number, skeletons } = &load.other else { return false };
             let side = &self.obstacles[*number as usize].side;
@@ -95,6 +96,11 @@ impl System {
             side.rigid
                 && near.iter().any(|index| {
                     let Placed { shape, profile } = &side.skeletons[*index as usize];
+                    // Distances from something convex are at least those from its tangent plane.
+                    let closest = shape.closest(start);
+                    if closest.distance + closest.normal.dot(&(end - start)).min(0.0) >= profile.thickness {
+                        return false;
+                    }
                     let (on_line, on_shape) = closest_points(&line, shape);
                     (on_line - on_shape).norm() < profile.thickness
                 })
@@ -139,6 +145,8 @@ impl System {
         let mut old = std::mem::take(&mut self.loads);
         self.near_skeletons.clear();
         self.place_obstacles(motions);
+        let widest = (1.0 + 2.0 * SKIN) * self.swarm.widest;
+        self.obstacles.iter_mut().for_each(|obstacle| obstacle.bound(widest));
         let mut fresh = Vec::with_capacity(old.len());
         for i in 0..self.swarm.place.len() {
             self.list_obstacles(i, &mut fresh);
@@ -175,11 +183,7 @@ impl System {
                 continue;
             }
             let from = self.near_skeletons.len() as u32;
-            for (index, skeleton) in obstacle.side.skeletons.iter().enumerate() {
-                if skeleton.shape.closest(p).distance < skeleton.profile.radius + reach {
-                    self.near_skeletons.push(index as u32);
-                }
-            }
+            self.near_skeletons.extend(obstacle.near(p, reach));
             let to = self.near_skeletons.len() as u32;
             if to > from {
                 let other = Other::Obstacle { number: number as u32, skeletons: (from, to) };
@@ -253,7 +257,7 @@ impl System {
         self.refresh(motions, team);
         self.forces(motions);
         self.kick(motions, 0.5 * h);
-        self.pairs.rub(&mut self.swarm.velocity, &self.swarm.kind, h);
+        self.pairs.rub(&mut self.swarm.velocity, h);
         self.rub_loads(motions, h);
     }
 
@@ -296,9 +300,11 @@ impl System {
         let motion = &mut motions[link as usize];
         let mut wrench = Wrench::default();
         wrench.add_force_at(impulse, &(motion.rotation * arm));
-        let change = motion.answer(&wrench);
-        motion.twist.linear += change.linear;
-        motion.twist.angular += change.angular;
+        if motion.is_movable() {
+            let change = motion.answer(&wrench);
+            motion.twist.linear += change.linear;
+            motion.twist.angular += change.angular;
+        }
         self.carried[link as usize].add_scaled(&wrench, 1.0);
     }
 
@@ -418,7 +424,7 @@ impl System {
                 continue;
             }
             with_locale(|locale| {
-                locale.gather(swarm, i, Some(label), f64::INFINITY);
+                locale.gather(swarm, i, Some(label), &place, 0.0);
                 let (mut own, mut others) = (Vec::new(), Vec::new());
                 locale.owners_at(&place, |index, _| own.push(index));
                 locale.others_at(&place, |index, _| others.push(index));

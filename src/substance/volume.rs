@@ -4,11 +4,14 @@
 //! own, or on the surface. Fields of one substance are one function of the distance less the offset, so the border of two
 //! territories is where `d_i - ε_i = d_j - ε_j`: a closed form on a ray. A ray that ends at a border within the solid
 //! shows that the two hang together.
+//!
+//! Most particles are buried, and the nearest around them show it. So the field is summed over these first, which leaves
+//! it too low if anything; all who have a field there are gathered for what is still open then.
 
 use std::cell::RefCell;
 use std::f64::consts::PI;
 
-use super::locale::{Locale, OnRays};
+use super::locale::{Locale, OnRays, round_sector};
 use super::swarm::Swarm;
 use crate::coat::volume::OFFSETS;
 use crate::field::lanes::{Dispatch, Kernel};
@@ -20,7 +23,7 @@ const STRIDE: f64 = 0.1;
 const CALM: f64 = 0.02;
 /// Last step of Newton's method along a ray, over the thickness: what is left after it is a hundredth of that, far below
 /// what the number of rays leaves out.
-const CLOSE: f64 = 3e-3;
+const CLOSE: f64 = 0.01;
 /// Least area that counts as exposed, as a fraction of the area of a ball of the same volume.
 const LEAST_AREA: f64 = 0.2;
 
@@ -53,6 +56,14 @@ impl Rays {
 
     fn count(&self) -> usize {
         self.u[0].len()
+    }
+
+    /// Only those with these numbers, in their order.
+    fn keep(&mut self, all: &Rays, numbers: &[usize]) {
+        for (own, column) in self.u.iter_mut().zip(&all.u) {
+            own.clear();
+            own.extend(numbers.iter().map(|number| column[*number]));
+        }
     }
 
     fn direction(&self, ray: usize) -> Vec3 {
@@ -89,6 +100,14 @@ impl Borders {
         for (column, x) in [(&mut self.first, end), (&mut self.slope, 1.0), (&mut self.rival, NONE)] {
             column.clear();
             column.resize(count, x);
+        }
+    }
+
+    /// Only those of the rays with these numbers, which are in ascending order.
+    fn keep(&mut self, numbers: &[usize]) {
+        for column in [&mut self.first, &mut self.slope, &mut self.rival] {
+            numbers.iter().enumerate().for_each(|(at, number)| column[at] = column[*number]);
+            column.truncate(numbers.len());
         }
     }
 
@@ -156,6 +175,18 @@ fn meet_one(
 
 /// A ray that does not end at a border close by.
 #[derive(Clone, Copy, Debug)]
+struct Open {
+    ray: usize,
+    /// Whose border it meets, if any, and where; that may be outside the solid.
+    rival: Option<usize>,
+    border: f64,
+    /// How far the field of those who were gathered is above the isovalue there, and how it changes along the ray.
+    excess: f64,
+    slope: f64,
+}
+
+/// A ray that does not end at a border within the solid.
+#[derive(Clone, Copy, Debug)]
 struct Late {
     ray: usize,
     /// The surface lies between these, perhaps here.
@@ -173,7 +204,10 @@ pub struct Ruler {
     locale: Locale,
     rivals: Vec<Rival>,
     borders: Borders,
-    met: Vec<Late>,
+    /// Rays that do not end at a border close by: their numbers among all, their directions, and where they are.
+    numbers: Vec<usize>,
+    directions: Rays,
+    open: Vec<Open>,
     late: Vec<Late>,
     points: OnRays,
 }
@@ -192,42 +226,75 @@ impl Ruler {
         share.volume = 0.0;
         share.exposed = 0.0;
         share.joined.clear();
-        let (matter, offset) = (swarm.matter_of(index), swarm.offset[index]);
-        let rays = &matter.rays;
+        let (matter, offset, center) = (swarm.matter_of(index), swarm.offset[index], &swarm.place[index]);
         let farthest = matter.farthest + offset;
-        let solid_angle = 4.0 * PI / rays.count() as f64;
+        let solid_angle = 4.0 * PI / matter.rays.count() as f64;
         // Up to here two alone are a solid together; and the neck of two may be thinner than what rays see.
         let close = matter.half + offset;
         self.rivals.clear();
         self.list_rivals(swarm, index, (f64::NEG_INFINITY, close));
         share.joined.extend(self.rivals.iter().map(|rival| rival.owner));
         let near = self.rivals.len();
-        self.borders.reset(rays.count(), farthest);
-        self.borders.meet(rays, &self.rivals, 0);
-        let far = (0..rays.count()).map(|ray| self.borders.distance(ray)).fold(0.0, f64::max);
-        if far > close {
-            self.list_rivals(swarm, index, (close, farthest));
-            self.borders.meet(rays, &self.rivals[near..], near);
+        self.borders.reset(matter.rays.count(), farthest);
+        self.borders.meet(&matter.rays, &self.rivals, 0);
+        self.end_close(&matter.rays, close, solid_angle, share);
+        if self.numbers.is_empty() {
+            return;
         }
-        let Self { borders, rivals, met, late, .. } = self;
-        met.clear();
-        late.clear();
-        // A guess from which most need two or three rounds.
-        let low = (matter.profile.thickness + offset).min(farthest);
+        let far = (0..self.numbers.len()).map(|ray| self.borders.distance(ray)).fold(0.0, f64::max);
+        if far > close {
+            self.list_rivals(swarm, index, (close, far));
+            self.borders.meet(&self.directions, &self.rivals[near..], near);
+        }
+        self.list_open();
+        let blended = self.rivals[..near].iter().filter(|rival| rival.weight >= 1.0);
+        self.locale.gather_only(swarm, index, blended.map(|rival| rival.owner as usize));
+        self.end_within(center, close, solid_angle, share);
+        if self.open.is_empty() {
+            return;
+        }
+        let (middle, radius) = self.ball_round_open(farthest);
+        self.locale.gather(swarm, index, None, &(center + middle), radius);
+        self.end_within(center, close, solid_angle, share);
+        let thickness = matter.profile.thickness + offset;
+        // Between where it is of one alone and of two: a guess from which most need two rounds.
+        self.let_on(thickness.min(farthest), 0.5 * (thickness + close), farthest);
+        self.find_surface(center, CLOSE * thickness, solid_angle, share);
+    }
+
+    /// Ends rays at borders close by with those that blend fully; the others are left.
+    fn end_close(&mut self, rays: &Rays, close: f64, solid_angle: f64, share: &mut Share) {
+        let Self { rivals, borders, numbers, directions, .. } = self;
+        numbers.clear();
         for ray in 0..rays.count() {
             let border = borders.distance(ray);
-            match borders.rival(ray).map(|rival| rivals[rival].weight) {
-                Some(weight) if weight >= 1.0 && border <= close => share.add(solid_angle, border, 0.0),
-                Some(weight) => met.push(Late { ray, low, high: farthest, guess: close, weight, border }),
-                None => late.push(Late { ray, low, high: farthest, guess: close, weight: 0.0, border }),
+            match borders.rival(ray) {
+                Some(rival) if rivals[rival].weight >= 1.0 && border <= close => share.add(solid_angle, border, 0.0),
+                _ => numbers.push(ray),
             }
         }
-        if !met.is_empty() || !late.is_empty() {
-            self.locale.gather(swarm, index, None, farthest + swarm.widest);
-            self.find_solid(&swarm.place[index], rays, close, solid_angle, share);
-            let near = CLOSE * (matter.profile.thickness + offset);
-            self.find_surface(&swarm.place[index], rays, near, solid_angle, share);
-        }
+        borders.keep(numbers);
+        directions.keep(rays, numbers);
+    }
+
+    fn list_open(&mut self) {
+        let Self { borders, numbers, open, .. } = self;
+        open.clear();
+        open.extend((0..numbers.len()).map(|ray| Open {
+            ray,
+            rival: borders.rival(ray),
+            border: borders.distance(ray),
+            excess: 0.0,
+            slope: 0.0,
+        }));
+    }
+
+    /// A ball round all open rays up to this length, as seen from the particle.
+    fn ball_round_open(&self, length: f64) -> (Vec3, f64) {
+        let directions = || self.open.iter().map(|open| self.directions.direction(open.ray));
+        let axis = directions().sum::<Vec3>().try_normalize(1e-9).unwrap_or_else(Vec3::x);
+        let cosine = directions().map(|u| u.dot(&axis)).fold(1.0, f64::min);
+        round_sector(&axis, cosine, length)
     }
 
     /// Lists with whom particle `index` blends and has a border whose nearest point is within this range.
@@ -251,41 +318,57 @@ impl Ruler {
         }
     }
 
-    /// Which rays meet a border within the solid; those that do not end there are late.
-    fn find_solid(&mut self, center: &Vec3, rays: &Rays, close: f64, solid_angle: f64, share: &mut Share) {
-        let Self { locale, rivals, borders, met, late, points, .. } = self;
+    /// Ends rays at borders that are within the solid, as far as the fields of those gathered show it.
+    fn end_within(&mut self, center: &Vec3, close: f64, solid_angle: f64, share: &mut Share) {
+        let Self { locale, rivals, directions, open, points, .. } = self;
         points.clear();
-        met.iter().for_each(|Late { ray, border, .. }| points.push(&rays.direction(*ray), *border));
+        for ray in open.iter().filter(|ray| ray.rival.is_some()) {
+            points.push(&directions.direction(ray.ray), ray.border);
+        }
         locale.look(center, points);
-        for (at, mut ray) in met.iter().copied().enumerate() {
-            let Some(rival) = borders.rival(ray.ray) else { continue };
-            let rival = &rivals[rival];
-            let excess = points.value[at] - locale.isovalue();
+        let mut at = 0;
+        open.retain_mut(|ray| {
+            let Some(rival) = ray.rival.map(|rival| &rivals[rival]) else { return true };
+            ray.excess = points.value[at] - locale.isovalue();
+            ray.slope = points.slope[at];
+            at += 1;
             // Both have the same field at the border, and most often these two are enough.
-            let is_solid = ray.border <= close || excess >= 0.0;
+            let is_solid = ray.border <= close || ray.excess >= 0.0;
             if is_solid {
                 share.join(rival.owner);
             }
-            if rival.weight >= 1.0 {
-                if is_solid {
-                    share.add(solid_angle, ray.border, 0.0);
-                    continue;
-                }
-                // The surface is before the border.
-                let step = -excess / points.slope[at];
-                (ray.high, ray.weight) = (ray.border.max(ray.low), 0.0);
-                ray.guess = if step < 0.0 { ray.border + step } else { ray.guess };
+            let ends = is_solid && rival.weight >= 1.0;
+            if ends {
+                share.add(solid_angle, ray.border, 0.0);
             }
-            late.push(ray);
-        }
+            !ends
+        });
+    }
+
+    /// Open rays are late ones now: their surface is between `low` and `high`, perhaps at the guess.
+    fn let_on(&mut self, low: f64, guess: f64, high: f64) {
+        let Self { rivals, open, late, .. } = self;
+        late.clear();
+        late.extend(open.iter().map(|Open { ray, rival, border, excess, slope }| {
+            let (ray, border) = (*ray, *border);
+            match rival.map(|rival| rivals[rival].weight) {
+                Some(weight) if weight >= 1.0 => {
+                    // The surface is before the border.
+                    let step = -excess / slope;
+                    let guess = if step < 0.0 { border + step } else { guess };
+                    Late { ray, low, high: border.max(low), guess, weight: 0.0, border }
+                }
+                weight => Late { ray, low, high, guess, weight: weight.unwrap_or(0.0), border },
+            }
+        }));
     }
 
     /// Where late rays leave the solid, to a last step of `near`: Newton's method in a bracket.
-    fn find_surface(&mut self, center: &Vec3, rays: &Rays, near: f64, solid_angle: f64, share: &mut Share) {
-        let Self { locale, late, points, .. } = self;
+    fn find_surface(&mut self, center: &Vec3, near: f64, solid_angle: f64, share: &mut Share) {
+        let Self { locale, directions, late, points, .. } = self;
         points.clear();
         for ray in &*late {
-            points.push(&rays.direction(ray.ray), ray.guess.clamp(ray.low, ray.high));
+            points.push(&directions.direction(ray.ray), ray.guess.clamp(ray.low, ray.high));
         }
         while !late.is_empty() {
             locale.look(center, points);

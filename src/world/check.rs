@@ -3,7 +3,7 @@
 
 use super::blend::{Blending, Pairing};
 use super::sleep::Sleep;
-use super::{Contact, Link, Skeleton, World, desc};
+use super::{Contact, Link, LinkId, Skeleton, SkeletonId, World, desc};
 use crate::coat::volume::OFFSETS;
 use crate::contact::candidate::Memory;
 use crate::contact::friction::Bristle;
@@ -139,9 +139,13 @@ impl World {
         }
         self.check_memories(resting)?;
         for contact in contacts {
+            // A substance has neither links nor skeletons.
             let live = contact.bodies.iter().all(|id| self.bodies.is_live(id.index()))
-                && contact.links.iter().all(|id| self.links.is_live(id.index()))
-                && contact.skeletons.iter().all(|id| self.skeletons.is_live(id.index()));
+                && contact.links.iter().all(|id| *id == LinkId::default() || self.links.is_live(id.index()))
+                && contact
+                    .skeletons
+                    .iter()
+                    .all(|id| *id == SkeletonId::default() || self.skeletons.is_live(id.index()));
             if !live || !contact.bodies.iter().any(|id| self.bodies[id.index()].is_asleep()) {
                 return refuse(contact.bodies[0].index(), "has a contact at rest, but nobody is asleep");
             }

@@ -3,7 +3,8 @@
 //! An island whose bodies have all been slow for the world's `sleep_time` falls asleep as a whole: its bodies stop where
 //! they are, its contacts stay as they were last reported, and of its pairs only the memory is kept. It wakes as a
 //! whole, with nothing forgotten, in the step in which anything new comes into reach of one of its bodies, or at once
-//! when the host changes one of them or what they lean on.
+//! when the host changes one of them or what they lean on. Substances, which are in no island, do it in
+//! [`substance`](super::substance).
 
 use super::step::Stepping;
 use super::volume::Control;
@@ -103,7 +104,7 @@ impl World {
 
     /// Whether a body that is awake does not move, and has not been changed since the last step: who sleeps near it has
     /// its peace.
-    fn is_still(&self, body: u32, state: &Stepping) -> bool {
+    pub(super) fn is_still(&self, body: u32, state: &Stepping) -> bool {
         let body = &self.bodies[body as usize];
         body.sleep.quiet > 0.0
             && body.links.iter().all(|link| {
@@ -173,6 +174,7 @@ impl World {
                 self.links[*link as usize].desc.twist = Twist::default();
             }
         }
+        fell |= self.let_substances_sleep(state, dt);
         if !fell {
             return;
         }
@@ -198,6 +200,10 @@ impl World {
     /// Whether a body that may sleep hardly moves.
     fn is_slow(&self, slot: usize, state: &Stepping) -> bool {
         let body = &self.bodies[slot];
+        if let Some(substance) = &body.substance {
+            let thickness = substance.desc.profile(body.desc.isovalue).map_or(0.0, |profile| profile.thickness);
+            return body.desc.may_sleep && substance.is_slow(self.desc.sleep_speed * thickness);
+        }
         let thickness = self.skeletons_of(body).map(|(_, _, s)| s.profile.thickness).fold(f64::INFINITY, f64::min);
         let bounds = state.bounds_of.get(slot).and_then(|position| state.bounds.get(*position));
         let size = bounds.map_or(0.0, |bounds| 0.5 * (bounds.high - bounds.low).norm());
@@ -213,7 +219,7 @@ impl World {
     }
 }
 
-fn is_asleep(bodies: &Arena<Body>, slot: u32) -> bool {
+pub(super) fn is_asleep(bodies: &Arena<Body>, slot: u32) -> bool {
     bodies.is_live(slot as usize) && bodies[slot as usize].is_asleep()
 }
 

@@ -20,8 +20,8 @@ use super::bytes::{Counter, Cursor, Lasting, Reader, Sink, enums, structs, write
 use super::check::refused;
 use super::sleep::Sleep;
 use super::{
-    Body, BodyDesc, Contact, Link, LinkDesc, Skeleton, SkeletonDesc, Spring, SpringDesc, StiffnessRule, World,
-    WorldDesc, check_plane, step, units::Said,
+    Body, BodyDesc, Contact, Link, LinkDesc, LinkId, Skeleton, SkeletonDesc, SkeletonId, Spring, SpringDesc,
+    StiffnessRule, World, WorldDesc, check_plane, step, units::Said,
 };
 use crate::base::Kind;
 use crate::contact::Scheme;
@@ -382,8 +382,9 @@ impl World {
         }
         for Contact { bodies, links, skeletons, .. } in &mut contacts {
             bodies.iter_mut().for_each(|id| id.raw.world = tag);
-            links.iter_mut().for_each(|id| id.raw.world = tag);
-            skeletons.iter_mut().for_each(|id| id.raw.world = tag);
+            // A substance has neither links nor skeletons.
+            links.iter_mut().filter(|id| **id != LinkId::default()).for_each(|id| id.raw.world = tag);
+            skeletons.iter_mut().filter(|id| **id != SkeletonId::default()).for_each(|id| id.raw.world = tag);
         }
         self.origin = fresh.origin;
         self.take_over(fresh);

@@ -13,6 +13,7 @@ pub use crate::substance::{Change, Particle, ParticleId, SubstanceDesc};
 use crate::substance::{MOST_PARTICLES, Substance, fill};
 use crate::surface::mesh;
 
+mod sleep;
 mod step;
 
 /// Some of a substance that hangs together.
@@ -250,7 +251,10 @@ impl World {
         self.bodies.get(body)?.substance.as_deref().ok_or(NO_SUBSTANCE)
     }
 
+    /// Whoever changes a substance wakes it.
     fn substance_mut(&mut self, body: BodyId) -> Result<&mut Substance> {
+        self.substance(body)?;
+        self.rouse(body.raw.index);
         self.bodies.get_mut(body)?.substance.as_deref_mut().ok_or(NO_SUBSTANCE)
     }
 

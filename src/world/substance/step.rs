@@ -27,16 +27,17 @@ type Labels = BTreeSet<u32>;
 
 impl World {
     /// Substances that take part, by the slots of their bodies.
-    fn substances(&self) -> impl Iterator<Item = (u32, &Body, &Substance)> {
+    pub(super) fn substances(&self) -> impl Iterator<Item = (u32, &Body, &Substance)> {
         self.bodies.indices().filter_map(|slot| {
             let body = &self.bodies[slot];
-            let substance = body.substance.as_deref().filter(|s| body.enabled && !s.particles.is_empty())?;
-            Some((slot as u32, body, substance))
+            let substance = body.substance.as_deref().filter(|s| !s.particles.is_empty())?;
+            (body.enabled && !body.is_asleep()).then_some((slot as u32, body, substance))
         })
     }
 
     /// Where the fields of a substance may reach in a step.
-    fn region_of(&self, substance: &Substance, radius: f64, dt: f64) -> (Vec3, Vec3) {
+    pub(super) fn region_of(&self, body: &Body, substance: &Substance, dt: f64) -> (Vec3, Vec3) {
+        let radius = substance.desc.profile(body.desc.isovalue).map_or(0.0, |profile| profile.radius);
         let (mut low, mut high) = (Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY));
         let fall = 0.5 * self.desc.gravity.norm() * dt * dt;
         for particle in &substance.particles {
@@ -51,18 +52,13 @@ impl World {
         if self.desc.sleep_time <= 0.0 {
             return;
         }
-        let radius = |body: &Body, substance: &Substance| {
-            substance.desc.profile(body.desc.isovalue).map_or(0.0, |profile| profile.radius)
-        };
-        let regions: Vec<_> = self
-            .substances()
-            .map(|(_, body, substance)| self.region_of(substance, radius(body, substance), dt))
-            .collect();
+        let regions: Vec<_> =
+            self.substances().map(|(_, body, substance)| self.region_of(body, substance, dt)).collect();
         for bounds in &state.last_bounds {
             let meets = |(low, high): &(Vec3, Vec3)| {
                 (0..3).all(|axis| bounds.low[axis] <= high[axis] && low[axis] <= bounds.high[axis])
             };
-            if regions.iter().any(meets) {
+            if sleep::is_asleep(&self.bodies, bounds.body) && regions.iter().any(meets) {
                 sleep::rouse(&mut self.bodies, &state.resting, bounds.body);
             }
         }
@@ -77,6 +73,7 @@ impl World {
                 substance.changes.clear();
             }
         }
+        self.wake_substances(state, dt);
         if self.substances().next().is_none() {
             return;
         }
@@ -141,6 +138,7 @@ impl World {
                 viscosity: desc.viscosity,
                 damping: desc.damping,
                 fusion_threshold: desc.fusion_threshold,
+                inverse_width: 1.0 / (profile.radius - profile.thickness),
                 half: profile.distance_of_level(0.5 * profile.isovalue),
                 farthest: profile.distance_of_level(profile.isovalue / CROWD),
                 profile,
@@ -172,7 +170,7 @@ impl World {
             for (matter, found) in system.swarm.matters.iter().zip(&mut materials) {
                 let own = &self.bodies[matter.body as usize];
                 let Some(substance) = &own.substance else { continue };
-                let (low, high) = self.region_of(substance, matter.profile.radius, dt);
+                let (low, high) = self.region_of(own, substance, dt);
                 let (low, high) = (low.sup(&bounds.low), high.inf(&bounds.high));
                 let meets = (0..3).all(|axis| low[axis] <= high[axis]);
                 let agree = own.desc.mask & body.desc.category != 0 && body.desc.mask & own.desc.category != 0;
