@@ -81,6 +81,12 @@ impl Carriers {
         share(&pair.b, position, &mut self.b);
     }
 
+    /// Those of both: of a with negative weights, so that they make a relative velocity.
+    pub fn both(&self) -> impl Iterator<Item = Share> + '_ {
+        let opposed = |share: &Share| Share { weight: -share.weight, ..*share };
+        self.a.iter().map(opposed).chain(self.b.iter().copied())
+    }
+
     /// Velocity of b's flesh relative to a's at a point.
     pub fn slip(&self, motions: &[Motion], origin: &Vec3, position: &Vec3) -> Vec3 {
         let velocity = |shares: &[Share]| {

@@ -133,7 +133,7 @@ impl Coupled {
 
     /// Adds the groups of a bundle.
     pub fn append(&mut self, bundle: &Bundle) {
-        let (points, members) = (self.points.len(), self.members.len());
+        let (points, members) = (self.points.count(), self.members.len());
         let behind = |range: (usize, usize), first: usize| (range.0 + first, range.1 + first);
         self.groups.extend(bundle.groups.iter().map(|group| Group {
             points: behind(group.points, points),

@@ -48,7 +48,7 @@ impl Points {
     }
 
     /// How many there are.
-    pub fn len(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.load.len()
     }
 
@@ -69,7 +69,7 @@ impl Points {
 
     /// Adds nodes, and gives their centre of pressure, from which their arms go.
     pub fn extend<'a>(&mut self, nodes: impl Iterator<Item = &'a Node>) -> Vec3 {
-        let first = self.len();
+        let first = self.count();
         let mut center = Vec3::zeros();
         for node in nodes {
             let load = node.force.norm();
@@ -81,7 +81,7 @@ impl Points {
         for (row, center) in self.arm.iter_mut().zip(center.iter()) {
             row[first..].iter_mut().for_each(|arm| *arm -= center);
         }
-        let count = self.len() - first;
+        let count = self.count() - first;
         if count > 1 {
             let end = first + count.next_multiple_of(LANES);
             for row in self.rows_mut() {

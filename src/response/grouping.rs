@@ -2,14 +2,14 @@
 //! [implicit step](super::implicit), as points that press and rub on the links that carry them.
 
 use super::group::{Grip, Group, Member, Point, Points};
-use super::sharing::{Part, Sharing};
+use super::sharing::Sharing;
 use super::substep::PUSH_OUT;
 use crate::base::{Inertia, Motion};
 use crate::contact::candidate::Candidate;
 use crate::contact::deepest::{self, Approach};
 use crate::contact::pair::Pair;
 use crate::contact::patch::{self, Node, Patch, Sums};
-use crate::contact::press::{Carriers, Material, friction_radius};
+use crate::contact::press::{Carriers, Material, Share, friction_radius};
 use crate::contact::stiffness::reachable;
 use crate::math::{Twist, Vec3};
 
@@ -106,15 +106,15 @@ impl Grouping<'_> {
         let Self { bundle, trial, candidate: Candidate { pair, material, .. }, index, .. } = self;
         let Bundle { groups, points, members, sharing, .. } = &mut **bundle;
         sharing.find(pair, nodes);
-        sharing.each_kind(nodes, |nodes, carriers| {
-            let (first_point, first_member) = (points.len(), members.len());
+        sharing.each_kind(nodes, |nodes, shares| {
+            let (first_point, first_member) = (points.count(), members.len());
             let center = points.extend(nodes);
-            members.extend(carriers.iter().map(|part| member(trial, pair, &center, *part)));
+            members.extend(shares.iter().map(|share| member(trial, pair, &center, *share)));
             groups.push(Group {
                 candidate: *index,
                 patch: Some(number as u32),
                 center,
-                points: (first_point, points.len()),
+                points: (first_point, points.count()),
                 members: (first_member, members.len()),
                 material: *material,
                 grip: Grip { slip: grip.slip + grip.spin.cross(&(center - sums.center)), ..*grip },
@@ -179,19 +179,15 @@ impl Grouping<'_> {
     fn add_lone(&mut self, approach: &Approach, load: f64, stiffness: f64) {
         let Bundle { groups, points, members, carriers, .. } = &mut *self.bundle;
         let (pair, center) = (&self.candidate.pair, approach.meeting);
-        let (first_point, first_member) = (points.len(), members.len());
+        let (first_point, first_member) = (points.count(), members.len());
         points.push(&Point { arm: Vec3::zeros(), normal: approach.direction, load, stiffness, area: 0.0 });
         carriers.find(pair, &center);
-        for (shares, sign) in [(&carriers.a, -1.0), (&carriers.b, 1.0)] {
-            members.extend(
-                shares.iter().map(|share| member(self.trial, pair, &center, (share.link, sign * share.weight))),
-            );
-        }
+        members.extend(carriers.both().map(|share| member(self.trial, pair, &center, share)));
         groups.push(Group {
             candidate: self.index,
             patch: None,
             center,
-            points: (first_point, points.len()),
+            points: (first_point, points.count()),
             members: (first_member, members.len()),
             material: Material::default(),
             grip: Grip::default(),
@@ -201,7 +197,7 @@ impl Grouping<'_> {
 }
 
 /// What a link that carries a point of a pair is to a group.
-fn member(trial: &[Motion], pair: &Pair, center: &Vec3, (link, weight): Part) -> Member {
+fn member(trial: &[Motion], pair: &Pair, center: &Vec3, Share { link, weight }: Share) -> Member {
     let motion = &trial[link as usize];
     let turns = !matches!(motion.inertia, Inertia::Point { .. });
     Member { link, weight, arm: center - (motion.center - pair.origin), turns }

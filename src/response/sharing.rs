@@ -3,26 +3,26 @@
 
 use crate::contact::pair::Pair;
 use crate::contact::patch::Node;
-use crate::contact::press::Carriers;
+use crate::contact::press::{Carriers, Share};
+use crate::math::Vec3;
 
-/// Steps a unit in which parts are compared.
-const STEPS: f64 = 8.0;
-
-/// A link, and its part in what happens at a point: positive on b, negative on a.
-pub type Part = (u32, f64);
+/// Steps a unit in which shares are compared.
+const STEPS: f64 = 32.0;
 
 /// The nodes of a patch, by who carries them.
 #[derive(Debug, Default)]
 pub struct Sharing {
     carriers: Carriers,
-    /// Of each node that was asked for, one after the other.
-    parts: Vec<Part>,
-    /// The parts in the first node of each kind.
+    /// One link carries all on either side.
+    single: bool,
+    /// Of each node that was asked for, one after the other; weights are positive on b, negative on a.
+    shares: Vec<Share>,
+    /// The shares of the first node of each kind.
     firsts: Vec<(usize, usize)>,
-    /// Nodes with a load.
+    /// Nodes with a load, unless it is all one.
     places: Vec<Place>,
     /// Of each kind, one after the other.
-    means: Vec<Part>,
+    means: Vec<Share>,
 }
 
 /// A node with a load.
@@ -31,61 +31,61 @@ struct Place {
     kind: usize,
     node: usize,
     load: f64,
-    parts: (usize, usize),
+    shares: (usize, usize),
 }
 
 impl Sharing {
     /// Finds who carries the nodes of a patch.
     pub fn find(&mut self, pair: &Pair, nodes: &[Node]) {
-        self.parts.clear();
+        self.shares.clear();
         self.firsts.clear();
         self.places.clear();
-        let single = pair.a.only_link().is_some() && pair.b.only_link().is_some();
-        for (node, Node { position, force, .. }) in nodes.iter().enumerate() {
-            let load = force.norm();
-            if load <= 0.0 {
-                continue;
+        self.single = pair.a.only_link().is_some() && pair.b.only_link().is_some();
+        for (node, Node { position, force, .. }) in loaded(nodes) {
+            let (kind, shares) = self.kind_at(pair, position);
+            if self.single {
+                return;
             }
-            let (kind, parts) = match self.firsts.first() {
-                Some(first) if single => (0, *first),
-                _ => self.kind_at(pair, position),
-            };
-            self.places.push(Place { kind, node, load, parts });
+            self.places.push(Place { kind, node, load: force.norm(), shares });
         }
-        self.places.sort_by_key(|place| place.kind);
+        self.places.sort_unstable_by_key(|place| (place.kind, place.node));
     }
 
-    fn kind_at(&mut self, pair: &Pair, position: &crate::math::Vec3) -> (usize, (usize, usize)) {
-        let first = self.parts.len();
-        self.carriers.find(pair, position);
-        self.parts.extend(self.carriers.a.iter().map(|share| (share.link, -share.weight)));
-        self.parts.extend(self.carriers.b.iter().map(|share| (share.link, share.weight)));
-        let parts = (first, self.parts.len());
-        let of = |(first, end): (usize, usize)| &self.parts[first..end];
-        let kind = self.firsts.iter().position(|kind| alike(of(*kind), of(parts))).unwrap_or(self.firsts.len());
-        if kind == self.firsts.len() {
-            self.firsts.push(parts);
+    /// The kind of a node, and its shares.
+    fn kind_at(&mut self, pair: &Pair, position: &Vec3) -> (usize, (usize, usize)) {
+        let Self { carriers, shares, firsts, .. } = self;
+        let first = shares.len();
+        carriers.find(pair, position);
+        shares.extend(carriers.both());
+        let of = |(first, end): (usize, usize)| &shares[first..end];
+        let range = (first, shares.len());
+        let kind = firsts.iter().position(|kind| alike(of(*kind), of(range))).unwrap_or(firsts.len());
+        if kind == firsts.len() {
+            firsts.push(range);
         }
-        (kind, parts)
+        (kind, range)
     }
 
-    /// Tells `add` the nodes of each kind, and the mean parts of the links that carry them: each link bears the same load
+    /// Tells `add` the nodes of each kind, and the mean shares of the links that carry them: each link bears the same load
     /// by these as node by node.
     pub fn each_kind<'a>(
         &mut self,
         nodes: &'a [Node],
-        mut add: impl FnMut(&mut dyn Iterator<Item = &'a Node>, &[Part]),
+        mut add: impl FnMut(&mut dyn Iterator<Item = &'a Node>, &[Share]),
     ) {
-        let Self { parts, places, means, .. } = self;
+        let Self { single, shares, places, means, .. } = self;
+        if *single {
+            return add(&mut loaded(nodes).map(|(_, node)| node), shares);
+        }
         for places in places.chunk_by(|a, b| a.kind == b.kind) {
             means.clear();
             let total: f64 = places.iter().map(|place| place.load).sum();
             for place in places {
-                for (link, part) in &parts[place.parts.0..place.parts.1] {
-                    let share = part * place.load / total;
-                    match means.iter_mut().find(|(other, mean)| other == link && mean.signum() == part.signum()) {
-                        Some((_, mean)) => *mean += share,
-                        None => means.push((*link, share)),
+                for share in &shares[place.shares.0..place.shares.1] {
+                    let weight = share.weight * place.load / total;
+                    match means.iter_mut().find(|mean| are_one(mean, share)) {
+                        Some(mean) => mean.weight += weight,
+                        None => means.push(Share { weight, ..*share }),
                     }
                 }
             }
@@ -94,14 +94,23 @@ impl Sharing {
     }
 }
 
-/// Whether the same links have nearly the same parts.
-fn alike(some: &[Part], others: &[Part]) -> bool {
-    let rounded = |part: f64| (part * STEPS).round();
-    let of = |parts: &[Part], (link, part): &Part| {
-        let same = parts.iter().find(|(other, others)| other == link && others.signum() == part.signum());
-        same.map_or(0.0, |(_, part)| rounded(*part))
+/// The nodes that bear something, with their positions.
+fn loaded(nodes: &[Node]) -> impl Iterator<Item = (usize, &Node)> {
+    nodes.iter().enumerate().filter(|(_, node)| node.force != Vec3::zeros())
+}
+
+/// Whether both are of one link, and of one side.
+fn are_one(a: &Share, b: &Share) -> bool {
+    a.link == b.link && a.weight.signum() == b.weight.signum()
+}
+
+/// Whether the same links have nearly the same shares.
+fn alike(some: &[Share], others: &[Share]) -> bool {
+    let rounded = |share: &Share| (share.weight * STEPS).round();
+    let within = |some: &[Share], others: &[Share]| {
+        some.iter()
+            .all(|share| rounded(share) == others.iter().find(|other| are_one(other, share)).map_or(0.0, rounded))
     };
-    let within = |some: &[Part], others: &[Part]| some.iter().all(|part| rounded(part.1) == of(others, part));
     within(some, others) && within(others, some)
 }
 
@@ -109,13 +118,18 @@ fn alike(some: &[Part], others: &[Part]) -> bool {
 mod tests {
     use super::*;
 
+    fn shares(list: &[(u32, f64)]) -> Vec<Share> {
+        list.iter().map(|(link, weight)| Share { link: *link, weight: *weight }).collect()
+    }
+
     #[test]
-    fn parts_are_alike_to_a_sixteenth() {
-        let node = [(3, -1.0), (1, 0.5), (2, 0.5)];
-        assert!(alike(&node, &[(3, -1.0), (2, 0.53), (1, 0.47)]), "in any order");
-        assert!(alike(&node, &[(3, -1.0), (1, 0.49), (2, 0.47), (4, 0.04)]), "but for what hardly counts");
-        assert!(!alike(&node, &[(3, -1.0), (1, 0.6), (2, 0.4)]));
-        assert!(!alike(&node, &[(3, -1.0), (1, 1.0)]) && !alike(&[(3, -1.0), (1, 1.0)], &node));
-        assert!(!alike(&[(1, -1.0), (2, 1.0)], &[(1, 1.0), (2, -1.0)]), "sides count");
+    fn shares_are_alike_to_a_sixtyfourth() {
+        let node = shares(&[(3, -1.0), (1, 0.5), (2, 0.5)]);
+        let is_like = |list: &[(u32, f64)]| alike(&node, &shares(list)) && alike(&shares(list), &node);
+        assert!(is_like(&[(3, -1.0), (2, 0.51), (1, 0.49)]), "in any order");
+        assert!(is_like(&[(3, -1.0), (1, 0.495), (2, 0.49), (4, 0.015)]), "but for what hardly counts");
+        assert!(!is_like(&[(3, -1.0), (1, 0.53), (2, 0.47)]));
+        assert!(!is_like(&[(3, -1.0), (1, 1.0)]));
+        assert!(!is_like(&[(3, 1.0), (1, 0.5), (2, 0.5)]), "sides count");
     }
 }
