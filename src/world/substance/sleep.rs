@@ -1,7 +1,7 @@
 //! Sleep of substances: at rest they are left out of the steps, until something near them moves or is new.
 //!
 //! A substance sleeps on what does not move; what moves freely near it keeps it awake. Those that are near each other fall
-//! asleep together, as a group of [`sleep`](crate::world::sleep). With what they lie on they are kept among the pairs that
+//! asleep together, as a group of [`sleep`]. With what they lie on they are kept among the pairs that
 //! are asleep, so that whoever changes or takes away the one wakes the other.
 
 use crate::contact::candidate::Memory;
