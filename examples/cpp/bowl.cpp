@@ -2,9 +2,9 @@
 //
 //     bowl [folder [size]] [--record FILE]
 //
-// With a folder it leaves pictures there; --record FILE records it. The size is a little more than the number of particles: 11500 makes ten thousand.
-// Exits with 0 when the dough is in the bowl, has its volume, nothing has come through the bowl, and the bowl has rocked and
-// not turned over.
+// With a folder it leaves pictures there; --record FILE records it. The size is a little more than the number of
+// particles: 11500 makes ten thousand. Exits with 0 when the dough is in the bowl, has its volume, nothing has come through
+// the bowl, and the bowl has rocked and not turned over.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
