@@ -21,7 +21,7 @@ pub struct Sharing {
     firsts: Vec<(usize, usize)>,
     /// Nodes with a load, unless it is all one.
     places: Vec<Place>,
-    /// Of each kind, one after the other.
+    /// Of one kind.
     means: Vec<Share>,
 }
 
@@ -59,7 +59,8 @@ impl Sharing {
         shares.extend(carriers.both());
         let of = |(first, end): (usize, usize)| &shares[first..end];
         let range = (first, shares.len());
-        let kind = firsts.iter().position(|kind| alike(of(*kind), of(range))).unwrap_or(firsts.len());
+        // The last ones first: who is next to another is mostly carried like it.
+        let kind = firsts.iter().rposition(|kind| alike(of(*kind), of(range))).unwrap_or(firsts.len());
         if kind == firsts.len() {
             firsts.push(range);
         }
