@@ -14,7 +14,7 @@ use crate::substance::volume::{Rays, Share, measure, next_offset};
 use crate::team::Team;
 use crate::world::gather::material;
 use crate::world::step::Stepping;
-use crate::world::{Body, Contact, LinkId, LogLevel, Scheme, SkeletonId, World, sleep};
+use crate::world::{Body, Contact, LinkId, LogLevel, Scheme, SkeletonId, World};
 
 /// Looks at the volumes in one step, when a piece is farther off than this: squeezed within a step, it swells in the same.
 const LOOKS: usize = 6;
@@ -45,23 +45,6 @@ impl World {
             (low, high) = (low.inf(&(particle.position - margin)), high.sup(&(particle.position + margin)));
         }
         (low, high)
-    }
-
-    /// Who sleeps near a substance does not.
-    pub(in crate::world) fn wake_near_substances(&mut self, state: &Stepping, dt: f64) {
-        if self.desc.sleep_time <= 0.0 {
-            return;
-        }
-        let regions: Vec<_> =
-            self.substances().map(|(_, body, substance)| self.region_of(body, substance, dt)).collect();
-        for bounds in &state.last_bounds {
-            let meets = |(low, high): &(Vec3, Vec3)| {
-                (0..3).all(|axis| bounds.low[axis] <= high[axis] && low[axis] <= bounds.high[axis])
-            };
-            if sleep::is_asleep(&self.bodies, bounds.body) && regions.iter().any(meets) {
-                sleep::rouse(&mut self.bodies, &state.resting, bounds.body);
-            }
-        }
     }
 
     /// Moves all substances, and gives what they press on the impulses of it.
