@@ -106,6 +106,8 @@ struct Scene {
     a: Coat,
     b: Coat,
     place: fn(&mut Random) -> (Pose, Pose),
+    /// Samples on a line of the oracle's: a thin overlap needs more.
+    steps: usize,
 }
 
 fn scenes() -> Vec<Scene> {
@@ -116,7 +118,35 @@ fn scenes() -> Vec<Scene> {
     );
     let dumbbell = Coat::new(&[Shape::Point(Vec3::new(-0.12, 0.0, 0.0)), Shape::Point(Vec3::new(0.12, 0.0, 0.0))], 0.1);
     let cuboid = Coat::cuboid(Vec3::new(0.2, 0.15, 0.1), 0.05);
+    // Both bones come closest to a floor at their far ends, and bulge where they blend.
+    let bones = |drop: f64| {
+        let bone = |x: f64| Shape::Segment(Vec3::zeros(), Vec3::new(x, 0.0, -drop));
+        Coat::new(&[bone(-0.4), bone(0.4)], 0.1)
+    };
     vec![
+        Scene {
+            name: "bent limb-floor",
+            a: Coat::floor(0.1),
+            b: bones(0.02),
+            place: |random| {
+                let turn = Vec3::new(0.0, random.range(-0.02, 0.02), random.range(-3.0, 3.0));
+                let rotation = isocoat::math::rotation_from_vector(&turn);
+                (Pose::default(), Pose { position: Vec3::new(0.0, 0.0, 0.205), rotation })
+            },
+            steps: 72,
+        },
+        Scene {
+            name: "limb round an edge",
+            a: Coat::cuboid(Vec3::new(0.3, 0.3, 0.3), 0.02).hard(),
+            b: bones(0.4),
+            place: |random| {
+                let turn = Vec3::new(random.range(-0.2, 0.2), std::f64::consts::FRAC_PI_4, random.range(-0.05, 0.05));
+                let rotation = isocoat::math::rotation_from_vector(&turn);
+                let at = Vec3::new(random.range(0.37, 0.39), 0.0, random.range(0.37, 0.39));
+                (Pose::default(), Pose { position: at, rotation })
+            },
+            steps: 300,
+        },
         Scene {
             name: "segment-segment",
             a: segment.clone(),
@@ -126,6 +156,7 @@ fn scenes() -> Vec<Scene> {
                 let rotation = isocoat::math::rotation_from_vector(&turn);
                 (Pose::at(0.0, 0.0, 0.0), Pose { position: Vec3::new(random.range(-0.1, 0.1), 0.0, 0.18), rotation })
             },
+            steps: 72,
         },
         Scene {
             name: "triangle-ball",
@@ -138,6 +169,7 @@ fn scenes() -> Vec<Scene> {
                 let at = Vec3::new(-0.36 + 0.72 * x + 0.36 * y, -0.24 + 0.72 * y, 0.182);
                 (Pose::default(), Pose { position: at, ..Pose::default() })
             },
+            steps: 72,
         },
         Scene {
             name: "box-plane",
@@ -148,6 +180,7 @@ fn scenes() -> Vec<Scene> {
                 let rotation = isocoat::math::rotation_from_vector(&turn);
                 (Pose::default(), Pose { position: Vec3::new(0.0, 0.0, 0.245), rotation })
             },
+            steps: 72,
         },
         Scene {
             name: "box-ball",
@@ -157,6 +190,7 @@ fn scenes() -> Vec<Scene> {
                 let at = Vec3::new(random.range(-0.25, 0.25), random.range(-0.2, 0.2), 0.235);
                 (Pose::default(), Pose { position: at, ..Pose::default() })
             },
+            steps: 72,
         },
         Scene {
             name: "dumbbell-dumbbell",
@@ -168,6 +202,7 @@ fn scenes() -> Vec<Scene> {
                 let at = Vec3::new(random.range(-0.1, 0.1), random.range(-0.1, 0.1), 0.17);
                 (Pose::default(), Pose { position: at, rotation })
             },
+            steps: 72,
         },
     ]
 }
@@ -181,8 +216,8 @@ fn other_pairs_agree_with_brute_force() {
             let (pose_a, pose_b) = (scene.place)(&mut random);
             let (a, b) = ((&scene.a, pose_a), (&scene.b, pose_b));
             let oracle = Oracle::new(a, b);
-            let exact = oracle.force(60);
-            let finer = oracle.force(90);
+            let exact = oracle.force_by(60, scene.steps);
+            let finer = oracle.force_by(90, scene.steps);
             assert!(finer.norm() > 0.0, "{}: no contact", scene.name);
             let doubt = (exact - finer).norm() / finer.norm();
             for scheme in [Scheme::Auto, Scheme::Facets, Scheme::Polar, Scheme::Adaptive, Scheme::Seeds] {
@@ -199,6 +234,8 @@ fn other_pairs_agree_with_brute_force() {
                         contacts.len()
                     );
                     let allowed = match (scheme, scene.name) {
+                        // Few rays go to so sharp an edge, and the estimate, from the others, does not know.
+                        (Scheme::Seeds, "limb round an edge") => 2e-2,
                         (Scheme::Seeds, _) => estimate.max(tolerance),
                         _ => tolerance,
                     };

@@ -91,6 +91,9 @@ pub struct Integrated {
     pub frame: Frame,
 }
 
+/// How often the plane is turned towards a part of the surface that leans over.
+const MOST_TURNS: u32 = 2;
+
 /// The surface leans over somewhere: it is no height over one plane.
 pub struct LeansOver {
     /// Evaluations it took to find out.
@@ -122,16 +125,25 @@ pub fn integrate(
         let scale = solver.frame.scale.map(|s| s.min(extent));
         solver.frame = Frame::new(at, scale);
     }
-    let mut work = Work { solver, workspace, leans: false };
-    // A tilted face is deepest at its rounded edge, which says nothing of its size.
-    while !work.spread(at) {
-        work.solver.frame.scale = work.solver.frame.scale.map(|scale| 4.0 * scale);
-    }
-    let error = work.refine(tolerance);
-    let (frame, evaluations) = (work.solver.frame, work.solver.evaluations);
-    if work.leans {
-        return Err(LeansOver { evaluations });
-    }
+    let mut turns = 0;
+    let error = loop {
+        let mut work = Work { solver, workspace, leans: None };
+        // A tilted face is deepest at its rounded edge, which says nothing of its size.
+        while !work.spread(at) {
+            work.solver.frame.scale = work.solver.frame.scale.map(|scale| 4.0 * scale);
+        }
+        let error = work.refine(tolerance);
+        let leans = work.leans;
+        solver = work.solver;
+        let Some(normal) = leans else { break error };
+        // Round an edge, a plane half way between sees both sides.
+        if turns == MOST_TURNS {
+            return Err(LeansOver { evaluations: solver.evaluations });
+        }
+        turns += 1;
+        solver.frame = solver.frame.facing(&(solver.frame.normal + normal));
+    };
+    let (frame, evaluations) = (solver.frame, solver.evaluations);
     workspace.collect(pair, &frame, nodes);
     let first = cells.len();
     cells.extend(workspace.visited.iter().filter(|(_, active)| **active).map(|(key, _)| *key));
@@ -177,7 +189,8 @@ fn length(steps: i32) -> f64 {
 struct Work<'a, 'b> {
     solver: Solver<'a>,
     workspace: &'b mut Workspace,
-    leans: bool,
+    /// The normal where the surface leans over.
+    leans: Option<Vec3>,
 }
 
 impl Work<'_, '_> {
@@ -202,7 +215,7 @@ impl Work<'_, '_> {
         self.workspace.queue.push((i, j, height));
         self.workspace.visited.insert((i, j), false);
         let mut next = 0;
-        while !self.leans && next < self.workspace.queue.len() {
+        while self.leans.is_none() && next < self.workspace.queue.len() {
             if self.workspace.cells.len() >= MOST_FIRST_CELLS {
                 return false;
             }
@@ -245,7 +258,7 @@ impl Work<'_, '_> {
             }
             let size = force.norm();
             let relative = if size > 0.0 { error / size } else { 1.0 };
-            if self.leans || relative <= tolerance || worst == 0.0 || self.workspace.cells.len() + 4 > most {
+            if self.leans.is_some() || relative <= tolerance || worst == 0.0 || self.workspace.cells.len() + 4 > most {
                 return relative.min(1.0) + 1e-14;
             }
             let limit = (0.2 * worst).max(0.25 * tolerance * size / live as f64).min(worst);
@@ -481,8 +494,8 @@ impl Work<'_, '_> {
             });
             (self.workspace.vertices.len() - 1) as u32
         });
-        if found.is_none() {
-            self.leans |= self.contact_leans(x, y, guess);
+        if found.is_none() && self.leans.is_none() {
+            self.leans = self.contact_leaning(x, y, guess);
         }
         self.workspace.places.insert(place, found);
         found
@@ -493,12 +506,10 @@ impl Work<'_, '_> {
         (v - self.solver.frame.normal * v.dot(&self.solver.frame.normal)).norm()
     }
 
-    /// Whether there is still pressure where a column was not found.
-    fn contact_leans(&mut self, x: f64, y: f64, guess: f64) -> bool {
+    /// The normal where a column was not found, if there is still pressure.
+    fn contact_leaning(&mut self, x: f64, y: f64, guess: f64) -> Option<Vec3> {
         let sample = self.solver.pair.sample(&self.solver.frame.point(x, y, guess));
-        let square = sample.difference_gradient.norm_squared();
-        square > 0.0
-            && sample.sum - sample.difference * sample.sum_gradient.dot(&sample.difference_gradient) / square > 0.0
+        if sample.is_pressed(0.0) { sample.normal() } else { None }
     }
 }
 

@@ -53,6 +53,15 @@ impl Frame {
         (d.dot(&self.u) / self.scale[0], d.dot(&self.v) / self.scale[1], d.dot(&self.normal))
     }
 
+    /// The frame turned to have its heights along a direction, which is not across them.
+    pub fn facing(&self, direction: &Vec3) -> Self {
+        let normal = direction.normalize();
+        let along = [self.u, self.v].map(|axis| axis - normal * axis.dot(&normal));
+        let u = if along[0].norm_squared() > along[1].norm_squared() { along[0] } else { along[1].cross(&normal) };
+        let u = u.normalize();
+        Self { normal, u, v: normal.cross(&u), ..*self }
+    }
+
     /// Area of a unit of the coordinates \[m²\].
     pub fn unit_area(&self) -> f64 {
         self.scale[0] * self.scale[1]

@@ -1,7 +1,7 @@
 //! Discovery: the deepest points of a contact, found from the closest points of two primitives, so that no contact is
 //! too narrow to be found.
 
-use super::pair::{Pair, Sample};
+use super::pair::{Pair, Sample, Side};
 use crate::field::separation::{gap, separation, touching_point};
 use crate::field::{Shape, skeleton::closest_points};
 use crate::math::{Vec3, tangents};
@@ -40,17 +40,29 @@ pub struct Approach {
 
 /// Where skeletons `i` of a and `j` of b come closest.
 pub fn approach(pair: &Pair, i: usize, j: usize) -> Approach {
-    let (a, b) = (&pair.a.skeletons[i], &pair.b.skeletons[j]);
-    let (on_a, on_b) = closest_points(&a.shape, &b.shape);
-    let (distance, direction, from) = match (&a.shape, &b.shape) {
-        (_, Shape::Plane { normal, .. }) => (b.shape.closest(&on_a).distance, -normal, on_a),
+    approach_of(pair, i, j, &pair.a.skeletons[i].shape, &pair.b.skeletons[j].shape)
+}
+
+/// Where each corner of skeletons `i` of a and `j` of b comes closest to the other skeleton.
+pub fn approaches_of_corners(pair: &Pair, i: usize, j: usize) -> impl Iterator<Item = Approach> {
+    let (a, b) = (&pair.a.skeletons[i].shape, &pair.b.skeletons[j].shape);
+    let of_a = a.corners().map(move |corner| approach_of(pair, i, j, &Shape::Point(corner), b));
+    of_a.chain(b.corners().map(move |corner| approach_of(pair, i, j, a, &Shape::Point(corner))))
+}
+
+/// Where shapes `a` and `b`, all of skeletons `i` and `j` or a part of them, come closest.
+fn approach_of(pair: &Pair, i: usize, j: usize, a: &Shape, b: &Shape) -> Approach {
+    let (on_a, on_b) = closest_points(a, b);
+    let (distance, direction, from) = match (a, b) {
+        (_, Shape::Plane { normal, .. }) => (b.closest(&on_a).distance, -normal, on_a),
         (Shape::Plane { normal, .. }, _) => {
-            let distance = a.shape.closest(&on_b).distance;
+            let distance = a.closest(&on_b).distance;
             (distance, *normal, on_b - normal * distance)
         }
-        _ => apart(&a.shape, &b.shape, on_a, on_b),
+        _ => apart(a, b, on_a, on_b),
     };
-    let (ta, tb) = (a.profile.thickness, b.profile.thickness);
+    let thickness = |side: &Side, skeleton: usize| side.skeletons[skeleton].profile.thickness;
+    let (ta, tb) = (thickness(&pair.a, i), thickness(&pair.b, j));
     let (sa, sb) = (pair.a.slope(i), pair.b.slope(j));
     let along = if sa.is_infinite() {
         ta
@@ -166,6 +178,16 @@ pub fn find(pair: &Pair, i: usize, j: usize, from: &Approach) -> Option<Deepest>
     let mut found = best?;
     found.evaluations = evaluations;
     (found.sum > touch(pair)).then_some(found)
+}
+
+/// The surface near a point, where it is in contact.
+pub fn surface_near(pair: &Pair, i: usize, j: usize, position: &Vec3, evaluations: &mut u32) -> Option<Vec3> {
+    *evaluations += 1;
+    if !pair.sample(position).is_pressed(touch(pair)) {
+        return None;
+    }
+    let size = pair.a.skeletons[i].profile.thickness.min(pair.b.skeletons[j].profile.thickness);
+    fall(pair, [i, j], position, size, evaluations).map(|found| found.position)
 }
 
 /// The highest `σ` on the whole contact surface: the most that the two coats together are compressed, in units of

@@ -93,8 +93,7 @@ impl Side {
     /// convex core stays above its tangents, and fields fall with it.
     fn most(&self, center: &Vec3, legs: &[Vec3; 3]) -> f64 {
         const PLACES: [(f64, f64); 5] = [(0.0, 0.0), (1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)];
-        let mut sum = self.graph.rise() - self.isovalue;
-        for skeleton in &self.skeletons {
+        let highest = |skeleton: &Placed| {
             let mut least = f64::NEG_INFINITY;
             for (x, y) in PLACES {
                 let closest = skeleton.shape.closest(&(center + legs[0] * x + legs[1] * y));
@@ -103,9 +102,11 @@ impl Side {
                 least = least.max(closest.distance - rise[0] * x - rise[1] * y - fall);
             }
             let solid = matches!(skeleton.shape, Shape::Box { .. } | Shape::Plane { .. });
-            sum += skeleton.profile.value_slope(if solid { least } else { least.max(0.0) }).0;
-        }
-        sum
+            skeleton.profile.value_slope(if solid { least } else { least.max(0.0) }).0
+        };
+        // The field rises with each skeleton's, however they blend.
+        let fields = self.skeletons.iter().enumerate().map(|(index, skeleton)| (index, highest(skeleton)));
+        blend::together(&self.graph, fields) - self.isovalue
     }
 
     /// Pressure a metre of depth at the surface of a skeleton \[Pa/m\]; infinite for a rigid body.
@@ -175,6 +176,12 @@ impl Sample {
     pub fn normal(&self) -> Option<Vec3> {
         let length = self.difference_gradient.norm();
         (length > 1e-300).then(|| self.difference_gradient / -length)
+    }
+
+    /// Whether `σ` is above `least` on the surface next to the point, to first order.
+    pub fn is_pressed(&self, least: f64) -> bool {
+        let square = self.difference_gradient.norm_squared();
+        square > 0.0 && self.sum - self.difference * self.sum_gradient.dot(&self.difference_gradient) / square > least
     }
 }
 
@@ -269,9 +276,19 @@ impl Pair {
 
     /// A bound of `σ` from above on the contact surface within the parallelepiped about `center` with these half sides.
     pub fn most(&self, center: &Vec3, legs: &[Vec3; 3]) -> f64 {
+        // What a cover takes from both at least: the distance to a convex core is the largest at a corner.
+        let corner = |k: u32| {
+            let sign = |axis: u32| if k >> axis & 1 == 0 { 1.0 } else { -1.0 };
+            center + legs[0] * sign(0) + legs[1] * sign(1) + legs[2] * sign(2)
+        };
+        let taken = self.covers.iter().map(|cover| {
+            let least = (0..8).map(|k| cover.skeleton.value(&corner(k))).fold(f64::INFINITY, f64::min);
+            cover.weight * least - self.a.isovalue
+        });
+        let taken = taken.fold(0.0, f64::max);
         // On the surface `w_a α = w_b β`, so `σ` is `α / w_b` and `β / w_a`.
         let share = |side: &Side, weight: f64| {
-            if weight > 0.0 { side.most(center, legs) / weight } else { f64::INFINITY }
+            if weight > 0.0 { (side.most(center, legs) - taken) / weight } else { f64::INFINITY }
         };
         share(&self.a, self.wb).min(share(&self.b, self.wa))
     }

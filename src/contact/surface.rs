@@ -125,20 +125,50 @@ fn find_patches(pair: &Pair, settings: &Settings, out: &mut Surface) -> Option<(
         return most.1;
     }
     let extent = extent(&pair.a).min(extent(&pair.b));
-    for index in 0..out.maxima.len() {
+    let held = (0..out.maxima.len()).all(|index| {
         let at = out.maxima[index];
-        if out.covered.iter().any(|region| out.contains(region, &at.position)) {
-            continue;
-        }
-        if !patch(pair, settings, &at, extent, out) {
-            // The surface wraps round: no plane sees all of it, the seeds do.
-            out.patches.clear();
-            out.nodes.clear();
-            seeds::integrate(pair, seeds::STAND_IN, out);
-            return most.1;
-        }
+        out.holds(&at.position) || patch(pair, settings, &at, extent, out)
+    });
+    if !(held && find_missed(pair, settings, extent, out)) {
+        // The surface wraps round: no plane sees all of it, the seeds do.
+        out.patches.clear();
+        out.nodes.clear();
+        seeds::integrate(pair, seeds::STAND_IN, out);
     }
     most.1
+}
+
+/// Finds and integrates what is in contact, but in no patch so far. Two skeletons have one place where they come
+/// closest, but where others blend with them, their coats may touch at more: at the corners of either. And a patch that
+/// was taken for star-shaped may go on behind a bay. False when a surface leans over.
+fn find_missed(pair: &Pair, settings: &Settings, extent: f64, out: &mut Surface) -> bool {
+    if pair.a.skeletons.len() == 1 && pair.b.skeletons.len() == 1 {
+        // The distance of convex cores has one minimum.
+        return true;
+    }
+    for i in 0..pair.a.skeletons.len() {
+        for j in 0..pair.b.skeletons.len() {
+            for from in deepest::approaches_of_corners(pair, i, j) {
+                if from.distance >= pair.a.reach[i] + pair.b.reach[j] || out.holds(&from.meeting) {
+                    continue;
+                }
+                let meeting = deepest::surface_near(pair, i, j, &from.meeting, &mut out.evaluations);
+                let Some(meeting) = meeting.filter(|at| !out.holds(at)) else { continue };
+                let Some(at) = deepest::find(pair, i, j, &Approach { meeting, ..from }) else { continue };
+                out.evaluations += at.evaluations;
+                // Up there is a patch that left this out.
+                let settings = match (out.holds(&at.position), settings.scheme) {
+                    (false, _) => *settings,
+                    (true, Scheme::Auto | Scheme::ClosedForm) => Settings { scheme: Scheme::Adaptive, ..*settings },
+                    (true, _) => continue,
+                };
+                if !patch(pair, &settings, &at, extent, out) {
+                    return false;
+                }
+            }
+        }
+    }
+    true
 }
 
 impl Surface {
@@ -175,6 +205,11 @@ impl Surface {
                 (0..outline.len()).all(behind) && height.abs() < reach
             }
         }
+    }
+
+    /// Whether a point of the surface lies within a patch.
+    fn holds(&self, p: &Vec3) -> bool {
+        self.covered.iter().any(|region| self.contains(region, p))
     }
 
     /// Notes the region of the last patch, and drops the patches before that it holds too: they would count twice.
@@ -223,10 +258,7 @@ fn patch(pair: &Pair, settings: &Settings, at: &Deepest, extent: f64, out: &mut 
     let mut spent = 0;
     // Where skeletons blend, the surface has more than one face, and what lies between them may be missed.
     let alone = pair.a.skeletons.len() == 1 && pair.b.skeletons.len() == 1 && pair.covers.is_empty();
-    let facets = match settings.scheme {
-        Scheme::Auto | Scheme::ClosedForm => alone,
-        scheme => scheme == Scheme::Facets && pair.covers.is_empty(),
-    };
+    let facets = alone && !matches!(settings.scheme, Scheme::Polar | Scheme::Adaptive);
     if facets {
         let first_corner = out.outlines.len();
         match facets::integrate(pair, at, settings.tolerance, &mut out.pieces, &mut out.nodes, &mut out.outlines) {

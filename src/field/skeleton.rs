@@ -236,6 +236,25 @@ impl Shape {
             Shape::Plane { point, .. } => *point,
         }
     }
+
+    /// The corners of the shape; a point and a plane have none.
+    pub fn corners(&self) -> impl Iterator<Item = Vec3> {
+        let count = match self {
+            Shape::Point(_) | Shape::Plane { .. } => 0,
+            Shape::Segment(..) => 2,
+            Shape::Triangle(..) => 3,
+            Shape::Box { .. } => 8,
+        };
+        (0..count).map(|index| match self {
+            Shape::Segment(a, b) => [*a, *b][index],
+            Shape::Triangle(a, b, c) => [*a, *b, *c][index],
+            Shape::Box { center, half, axes } => {
+                let side = |axis: usize| if index >> axis & 1 == 0 { half[axis] } else { -half[axis] };
+                center + axes * Vec3::new(side(0), side(1), side(2))
+            }
+            Shape::Point(point) | Shape::Plane { point, .. } => *point,
+        })
+    }
 }
 
 /// Closest points of two shapes, as (on a, on b); two equal points when the shapes meet.
