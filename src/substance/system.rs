@@ -2,7 +2,7 @@
 //!
 //! Velocity Verlet with forces of [`forces`](super::forces) and of [`contact`](super::contact); friction as exact impulses
 //! after each sub-step. A contact is integrated when it has moved by a few percent of the thickness since it was last, and
-//! is a spring in between. Links that can move go along in the sub-steps, with all that is known to act on them; what they
+//! is a spring in between. Links that can move go along in the sub-steps, held by what held them in the last step; what they
 //! got is handed to the step's response, which then solves everything else.
 
 use super::contact::Press;
