@@ -101,7 +101,7 @@ fn force_on(world: &mut World, body: BodyId, ids: &[ParticleId]) -> Vec3 {
 }
 
 #[test]
-fn pieces_press_on_each_other_and_on_bodies_as_two_bodies_of_the_same_points_would() {
+fn pieces_press_on_each_other_as_two_bodies_of_the_same_points_would() {
     let spacing = 0.1;
     let desc = SubstanceDesc { cohesion: 0.0, damping: 0.0, ..clay(spacing) };
     println!("{:>6} {:>6} {:>12} {:>12} {:>9}", "count", "sink", "bodies N", "pieces N", "off");
@@ -127,7 +127,20 @@ fn pieces_press_on_each_other_and_on_bodies_as_two_bodies_of_the_same_points_wou
             println!("{count:>6} {sink:>6} {:>12.4} {:>12.4} {off:>9.4}", exact.z, force.z);
             // K r0² is 100 N: light contacts between particles are seen less well.
             assert!((force - exact).norm() < 0.02 * exact.norm() + 0.3);
-            // The same lump on a flat floor.
+        }
+    }
+}
+
+#[test]
+fn lumps_press_on_a_floor_as_bodies_of_the_same_points_would_up_to_their_middle() {
+    let spacing = 0.1;
+    let desc = SubstanceDesc { cohesion: 0.0, damping: 0.0, ..clay(spacing) };
+    println!("{:>6} {:>6} {:>12} {:>12} {:>9}", "count", "sink", "body N", "lump N", "off");
+    for (count, turn) in [(1, 0.0), (2, 0.4), (13, 0.0), (13, 1.1), (40, 0.7)] {
+        let a = packed(count, spacing, turn, Vec3::zeros());
+        let own = a.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
+        for sink in [0.1, 0.3, 0.4, 0.48] {
+            let reach = if count == 1 { 0.5 } else { 0.62 };
             let mut floors = world(0.0);
             let floor = ground(&mut floors);
             let lifted: Vec<Vec3> = a.iter().map(|p| p + Vec3::new(0.0, 0.0, spacing * (reach - sink) - own)).collect();
@@ -140,7 +153,7 @@ fn pieces_press_on_each_other_and_on_bodies_as_two_bodies_of_the_same_points_wou
             let ids = floors.add_particles(body, &arrays(&lifted), None).unwrap();
             let force = force_on(&mut floors, body, &ids);
             let off = (force - exact).norm() / exact.norm().max(1e-9);
-            println!("{:>6} {sink:>6} {:>12.4} {:>12.4} {off:>9.4}", "floor", exact.z, force.z);
+            println!("{count:>6} {sink:>6} {:>12.4} {:>12.4} {off:>9.4}", exact.z, force.z);
             assert!((force - exact).norm() < 0.04 * exact.norm() + 0.3);
         }
     }
@@ -182,6 +195,40 @@ fn a_lump_falls_on_the_ground_and_comes_to_rest_with_its_volume() {
     let weight = G * count as f64 * world.substance_desc(body).unwrap().particle_mass;
     println!("mean speed {mean:.1e} m/s, force over weight {:.4}", -contact / weight);
     assert!(mean < 0.02 && (contact / weight + 1.0).abs() < 0.02);
+}
+
+#[test]
+fn a_lump_rests_on_a_light_tray_that_its_host_holds() {
+    for constrained in [true, false] {
+        let mut world = world(G);
+        let soft = lump(&mut world, clay(0.1), &ball(Vec3::new(0.0, 0.0, 0.4), 0.3));
+        let weight = G * clay(0.1).particle_mass * world.particles(soft).unwrap().len() as f64;
+        let rigid = BodyDesc { rigid: true, friction: 0.6, static_friction: 0.8, ..BodyDesc::default() };
+        let body = world.create_body(rigid).unwrap();
+        let mass = 0.2 * weight / G;
+        let inertia = isocoat::math::Mat3::identity() * (0.3 * mass);
+        let tray = LinkDesc { kind: Kind::Host, mass, inertia, constrained, ..LinkDesc::default() };
+        let link = world.create_link(body, tray.clone()).unwrap();
+        let half = Vec3::new(0.8, 0.8, 0.05);
+        let shape = Shape::Box { center: Vec3::zeros(), half, axes: isocoat::math::Mat3::identity() };
+        world.create_skeleton(link, SkeletonDesc { shape, thickness: 0.05, ..SkeletonDesc::default() }).unwrap();
+        let (mut fastest, mut pushed) = (0.0_f64, 0.0);
+        let (steps, last) = (300, 60);
+        for step in 0..steps {
+            world.set_link_desc(link, tray.clone()).unwrap();
+            world.step(1.0 / 60.0).unwrap();
+            if step >= steps - last {
+                let speeds = world.particles(soft).unwrap().iter().map(|p| p.velocity.norm()).fold(0.0, f64::max);
+                fastest = fastest.max(speeds);
+                pushed -= world.link_impulse(link).unwrap().force.z * 60.0 / f64::from(last);
+            }
+        }
+        // With this speed the lump would follow a tray that nothing held in a step.
+        let fall = (G + weight / mass) / 60.0;
+        println!("constrained: {constrained}, {fastest:.4} m/s of {fall:.4} m/s, {pushed:.1} N of {weight:.1} N");
+        assert!(fastest < 0.3 * fall);
+        assert!((pushed / weight - 1.0).abs() < 0.02);
+    }
 }
 
 /// Potential energy of particles [J]: model.md, "Particles", written again.

@@ -144,6 +144,15 @@ impl Mirror {
         self.doubt > 0
     }
 
+    /// What the host did by itself in the last tick, of this length, as an acceleration; none where that is not known.
+    pub fn own_doing(&self, host: &Host, dt: f64) -> Twist {
+        let known = self.bypassed.or(self.active.then_some(self.expected_twist));
+        known.map_or_else(Twist::default, |expected| Twist {
+            linear: (host.twist.linear - expected.linear) / dt + self.estimate.linear,
+            angular: (host.twist.angular - expected.angular) / dt + self.estimate.angular,
+        })
+    }
+
     /// Sets the velocities of a motion that [`enter`](Self::enter) has prepared to those from which the host itself
     /// starts. Of a mirror in use the velocities are taken over; the host is told the difference. Of a `held` host, what
     /// holds it is estimated from how far it was off.
@@ -167,6 +176,9 @@ impl Mirror {
             linear: host.twist.linear - motion.acceleration * ahead,
             angular: host.twist.angular - motion.angular_acceleration * ahead,
         };
+        // What substances did in this tick comes on top, and is handed over with all other contacts.
+        let pushed = motion.answer(&motion.contact_impulse);
+        let start = Twist { linear: start.linear + pushed.linear, angular: start.angular + pushed.angular };
         self.owed = Twist::default();
         if self.active {
             self.owed =

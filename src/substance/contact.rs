@@ -27,8 +27,9 @@ const CLIMBS: usize = 4;
 const FARTHEST: f64 = 0.9;
 /// Rounds of Newton's method along a ray.
 const ROUNDS: usize = 8;
-/// Closest that the surface may come to a particle, over its thickness: nearer, it is pushed out.
-pub const CLOSEST: f64 = 0.1;
+/// Closest that the surface may be to where the rays begin, over the radius: they do behind a particle that is nearer, so
+/// that the widest fan still sees all of it.
+const CLOSEST: f64 = 0.2;
 
 /// What a particle meets.
 pub enum Opposite<'a> {
@@ -123,12 +124,12 @@ struct Node {
 }
 
 struct Fan<'a, 'b> {
-    center: Vec3,
+    /// Where the rays begin: at the particle, or behind it; and where they end.
+    origin: Vec3,
+    reach: f64,
     isovalue: f64,
+    /// Of the particle.
     radius: f64,
-    thickness: f64,
-    /// Distance of the foot.
-    straight: f64,
     stiffness: Stiffness,
     opposite: &'a Opposite<'b>,
     locale: &'a mut Locale,
@@ -146,13 +147,13 @@ impl Fan<'_, '_> {
         (wa * (own - self.isovalue) - wb * beta, gradient * wa - slope * wb)
     }
 
-    /// The surface along a ray: Newton's method from a guess, kept in a bracket.
-    fn root(&self, u: &Vec3, guess: f64) -> Option<(f64, Vec3)> {
-        let (mut low, mut high) = (0.0, self.radius);
+    /// The surface along a ray, not before `low`: Newton's method from a guess, kept in a bracket.
+    fn root(&self, u: &Vec3, guess: f64, mut low: f64) -> Option<(f64, Vec3)> {
+        let mut high = self.reach;
         let mut r = guess.clamp(low, high);
         let mut last = None;
         for _ in 0..ROUNDS {
-            let (difference, gradient) = self.difference(&(self.center + u * r));
+            let (difference, gradient) = self.difference(&(self.origin + u * r));
             let along = gradient.dot(u);
             if difference > 0.0 {
                 low = r;
@@ -171,19 +172,19 @@ impl Fan<'_, '_> {
             }
         }
         let (r, gradient, along) = last?;
-        (r < self.radius * (1.0 - 1e-6) && along < 0.0).then_some((r, gradient / along))
+        (r < self.reach * (1.0 - 1e-6) && along < 0.0).then_some((r, gradient / along))
     }
 
     /// `σ` on the surface along a ray.
     fn sum(&self, u: &Vec3, guess: f64) -> Option<f64> {
-        let (r, _) = self.root(u, guess)?;
+        let (r, _) = self.root(u, guess, 0.0)?;
         let (_, wb, _) = self.stiffness.weights();
-        Some((self.locale.own(&(self.center + u * r)) - self.isovalue) / wb)
+        Some((self.locale.own(&(self.origin + u * r)) - self.isovalue) / wb)
     }
 
     fn node(&mut self, u: &Vec3, guess: f64) -> Option<(f64, Node)> {
-        let (r, area) = self.root(u, guess)?;
-        let p = self.center + u * r;
+        let (r, area) = self.root(u, guess, 0.0)?;
+        let p = self.origin + u * r;
         let (own, gradient) = self.locale.own_gradient(&p);
         let alpha = own - self.isovalue;
         let n = area.normalize();
@@ -211,7 +212,6 @@ impl Fan<'_, '_> {
     /// the way to their particles. Its direction, its distance, and what is there.
     fn deepest(&mut self, mut axis: Vec3, guess: f64) -> Option<(Vec3, f64, Node)> {
         let (mut foot, mut node) = self.node(&axis, guess)?;
-        self.straight = foot.max(CLOSEST * self.thickness);
         if node.sum > 0.0 {
             return Some((axis, foot, node));
         }
@@ -232,7 +232,7 @@ impl Fan<'_, '_> {
             if step.norm() > most {
                 step *= most / step.norm();
             }
-            let to = node.p + step - self.center;
+            let to = node.p + step - self.origin;
             if step.norm() < 0.02 * foot || to.norm() > FARTHEST * self.radius {
                 break;
             }
@@ -255,27 +255,32 @@ pub fn press(
     center: Vec3,
     axis: Vec3,
     guess: f64,
-    (isovalue, radius, thickness): (f64, f64, f64),
+    (isovalue, radius): (f64, f64),
     stiffness: Stiffness,
     opposite: &Opposite,
 ) -> Press {
-    let mut fan = Fan { center, isovalue, radius, thickness, straight: 0.0, stiffness, opposite, locale };
+    let mut fan = Fan { origin: center, reach: radius, isovalue, radius, stiffness, opposite, locale };
     let (_, _, scale) = stiffness.weights();
     let mut press = Press::default();
-    let Some((straight, foot, first)) = fan.deepest(axis, guess) else { return press };
-    press.gap = Some(foot);
+    // Pressed hard, a particle is at the surface, or past it.
+    let Some((depth, _)) = fan.root(&axis, guess, -radius) else { return press };
+    let back = (CLOSEST * radius - depth).max(0.0);
+    (fan.origin, fan.reach) = (center - axis * back, radius + back);
+    let Some((straight, foot, first)) = fan.deepest(axis, depth + back) else { return press };
+    press.gap = Some(foot - back);
     press.point = first.p;
     press.peak = (scale * first.sum * first.apart, first.p);
-    // Square of the distance from the axis, on the plane at the foot.
-    let height = foot.max(CLOSEST * thickness);
-    let half_angle = libm::acos((fan.straight / radius).clamp(0.0, 1.0)) + libm::acos(axis.dot(&straight).min(1.0));
+    let across = (radius * radius - depth * depth).max(0.0).sqrt();
+    let half_angle = libm::atan2(across, depth + back) + libm::acos(axis.dot(&straight).min(1.0));
     let half_angle = half_angle.min(WIDEST);
+    // Square of the distance from the axis, on the plane at the foot.
+    let height = foot;
     let farthest = (height * libm::tan(half_angle)).powi(2);
     if farthest <= 0.0 {
         return press;
     }
-    let (middle, ball) = round_sector(&straight, libm::cos(half_angle), radius);
-    fan.locale.narrow(&(center + middle), ball);
+    let (middle, ball) = round_sector(&straight, libm::cos(half_angle), fan.reach);
+    fan.locale.narrow(&(fan.origin + middle), ball);
     let normal = first.area.normalize();
     let (e1, e2) = tangents(&straight);
     let (mut total, mut moment) = (0.0, Vec3::zeros());

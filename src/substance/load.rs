@@ -1,6 +1,6 @@
 //! What presses on one particle: integrated now and then, a spring in between.
 
-use super::contact::{self, CLOSEST, Opposite, Press, Stiffness};
+use super::contact::{self, Opposite, Press, Stiffness};
 use super::forces::direction;
 use super::locale::Locale;
 use super::swarm::Swarm;
@@ -183,10 +183,10 @@ impl Load {
                 let opposite = Opposite::Coat(side, skeletons);
                 let (excess, gradient) = opposite.excess(locale, &center);
                 let axis = gradient.try_normalize(1e-300).unwrap_or(-closest.normal);
-                if excess >= 0.0 || gap < CLOSEST * sizes.2 {
-                    let way = if excess >= 0.0 { excess / gradient.norm().max(1e-300) } else { 0.0 };
-                    let way = way.max(CLOSEST * sizes.2 - gap).min(sizes.2);
-                    self.escape = Some(-axis * way);
+                if excess >= 0.0 {
+                    // The pressure falls from here on.
+                    let way = excess / gradient.norm().max(1e-300);
+                    self.escape = Some(-axis * way.min(sizes.2));
                 }
                 (opposite, Stiffness { own: matter.stiffness_scale, other }, axis, gap)
             }
@@ -214,7 +214,7 @@ impl Load {
         if matches!(opposite, Opposite::Coat(..)) {
             locale.gather(swarm, i, None, &center, f64::INFINITY);
         }
-        self.press = contact::press(locale, center, axis, guess, sizes, stiffness, &opposite);
+        self.press = contact::press(locale, center, axis, guess, (sizes.0, sizes.1), stiffness, &opposite);
         self.carriers.clear();
         if self.link == u32::MAX {
             let carriers = &mut self.carriers;

@@ -2,7 +2,7 @@
 //!
 //! Velocity Verlet with forces of [`forces`](super::forces) and of [`contact`](super::contact); friction as exact impulses
 //! after each sub-step. A contact is integrated when it has moved by a few percent of the thickness since it was last, and
-//! is a spring in between. Links that can move go along in the sub-steps, with all that is known to act on them; what they
+//! is a spring in between. Links that can move go along in the sub-steps, held by what held them in the last step; what they
 //! got is handed to the step's response, which then solves everything else.
 
 use super::contact::Press;
@@ -15,11 +15,14 @@ use crate::base::Motion;
 use crate::contact::press::Material;
 use crate::field::skeleton::closest_points;
 use crate::field::{Placed, Shape};
-use crate::math::{Vec3, Wrench};
+use crate::math::{Twist, Vec3, Wrench};
 use crate::team::Team;
 
 /// Farthest that anything may move in a sub-step, over the thickness.
 const STRIDE: f64 = 0.25;
+/// What holds a link may do this much more than in the last step: it has to follow a load that grows, or the link gives way
+/// a little in each step and is put back, which drives swings of what lies on it.
+const SLACK: f64 = 2.0;
 /// Contacts or particles that a worker takes at a time.
 const BLOCK: usize = 8;
 
@@ -41,7 +44,7 @@ pub struct System {
     /// What each particle has of the coat, at the last look.
     pub shares: Vec<Share>,
     /// Links of obstacles, each once.
-    links: Vec<u32>,
+    pub links: Vec<HeldLink>,
     pairs: Pairs,
     loads: Vec<Load>,
     near_skeletons: Vec<u32>,
@@ -52,6 +55,26 @@ pub struct System {
     pub told: bool,
     /// The forces are those of the present places.
     forced: bool,
+}
+
+/// A link that goes along in the sub-steps.
+#[derive(Debug, Default)]
+pub struct HeldLink {
+    /// Its slot.
+    pub slot: u32,
+    /// What may hold it against what pulls at it and presses on it, as an acceleration: it undoes that, along itself.
+    pub hold: Twist,
+    /// Velocities when it was last held, and how much more it can be in this sub-step.
+    held_at: Twist,
+    left: [f64; 2],
+}
+
+impl HeldLink {
+    /// From these velocities on it is held for `h` seconds.
+    pub fn begin(&mut self, twist: Twist, h: f64) {
+        self.held_at = twist;
+        self.left = [&self.hold.linear, &self.hold.angular].map(|hold| SLACK * hold.norm() * h);
+    }
 }
 
 thread_local! {
@@ -107,6 +130,15 @@ impl System {
         })
     }
 
+    /// Lists the links of obstacles, which nothing holds so far.
+    pub fn gather_links(&mut self) {
+        let slots = self.obstacles.iter().flat_map(|obstacle| &obstacle.side.links);
+        self.links.clear();
+        self.links.extend(slots.map(|slot| HeldLink { slot: *slot, ..HeldLink::default() }));
+        self.links.sort_unstable_by_key(|link| link.slot);
+        self.links.dedup_by_key(|link| link.slot);
+    }
+
     /// Moves all particles, and the links of obstacles, by `dt`.
     pub fn advance(&mut self, motions: &mut [Motion], dt: f64, phase: f64, most: u32, team: &Team) {
         self.carried.clear();
@@ -117,10 +149,7 @@ impl System {
         // Nothing of the last step counts, so that a snapshot needs none of it.
         self.loads.clear();
         self.overloaded |= self.pairs.couple(&self.swarm.matters, (2.0 * phase / least).powi(2));
-        self.links.clear();
-        self.links.extend(self.obstacles.iter().flat_map(|obstacle| &obstacle.side.links));
-        self.links.sort_unstable();
-        self.links.dedup();
+        self.hold(motions);
         self.build(motions);
         self.refresh(motions, team);
         let mut left = dt;
@@ -134,6 +163,11 @@ impl System {
             self.substep(motions, h, team);
             self.substeps += 1;
             left = if left - h > 1e-9 * dt { left - h } else { 0.0 };
+        }
+        self.swarm.is_pressed.clear();
+        self.swarm.is_pressed.resize(self.swarm.place.len(), false);
+        for load in &self.loads {
+            self.swarm.is_pressed[load.particle as usize] |= load.press.push != Vec3::zeros();
         }
     }
 
@@ -246,19 +280,24 @@ impl System {
     }
 
     fn substep(&mut self, motions: &mut [Motion], h: f64, team: &Team) {
+        for link in &mut self.links {
+            link.begin(motions[link.slot as usize].twist, h);
+        }
         self.kick(motions, 0.5 * h);
+        self.hold(motions);
         for i in 0..self.swarm.place.len() {
             let velocity = self.swarm.velocity[i];
             self.swarm.place[i] += velocity * h;
         }
         for link in &self.links {
-            motions[*link as usize].drift(h);
+            motions[link.slot as usize].drift(h);
         }
         self.refresh(motions, team);
         self.forces(motions);
         self.kick(motions, 0.5 * h);
         self.pairs.rub(&mut self.swarm.velocity, h);
         self.rub_loads(motions, h);
+        self.hold(motions);
     }
 
     /// Forces between particles, and of loads.
@@ -283,7 +322,7 @@ impl System {
             self.swarm.velocity[i] += change;
         }
         for link in &self.links {
-            motions[*link as usize].kick(h);
+            motions[link.slot as usize].kick(h);
         }
         for index in 0..self.loads.len() {
             let load = &self.loads[index];
@@ -291,6 +330,22 @@ impl System {
                 let push = load.now(&self.swarm, motions, self.softened) * -h;
                 self.push_link(index, &push, motions);
             }
+        }
+    }
+
+    /// What holds links acts against all changes since the last time, as far as it can in this sub-step.
+    fn hold(&mut self, motions: &mut [Motion]) {
+        for HeldLink { slot, hold, held_at, left } in &mut self.links {
+            let twist = &mut motions[*slot as usize].twist;
+            let change = [twist.linear - held_at.linear, twist.angular - held_at.angular];
+            let [linear, angular] = [0, 1].map(|part| {
+                let direction = [&hold.linear, &hold.angular][part].try_normalize(0.0).unwrap_or_else(Vec3::zeros);
+                let back = (-change[part].dot(&direction)).clamp(0.0, left[part]);
+                left[part] -= back;
+                direction * back
+            });
+            *twist = Twist { linear: twist.linear + linear, angular: twist.angular + angular };
+            *held_at = *twist;
         }
     }
 

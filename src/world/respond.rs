@@ -318,7 +318,9 @@ impl World {
             host || self.bodies[link.body as usize].stacked > 0
         });
         let stiff = island.springs.iter().any(|spring| spring.rate2(&state.motions).sqrt() * dt > STIFF);
-        let implicit = held && !island.candidates.is_empty() || stiff;
+        // Substances have pushed by now.
+        let pushed = || island.links.iter().any(|link| state.motions[*link as usize].touched);
+        let implicit = held && (!island.candidates.is_empty() || pushed()) || stiff;
         (if implicit { Response::Implicit } else { Response::Substepped }, false)
     }
 

@@ -27,10 +27,16 @@ pub trait Distance {
 
     fn away<const W: usize>(&self, p: [Lanes<W>; 3]) -> Away<W>;
 
+    /// The distance alone, with the same bits.
+    #[inline(always)]
+    fn distance<const W: usize>(&self, p: [Lanes<W>; 3]) -> Lanes<W> {
+        self.away(p).distance
+    }
+
     /// Bounds of the distance in a cube with this middle and half this edge.
     #[inline(always)]
     fn span<const W: usize>(&self, center: [Lanes<W>; 3], half: f64) -> (Lanes<W>, Lanes<W>) {
-        let (distance, radius) = (self.away(center).distance, Lanes::splat(half * SQRT_3));
+        let (distance, radius) = (self.distance(center), Lanes::splat(half * SQRT_3));
         let near = distance - radius;
         (if Self::SOLID { near } else { near.max(Lanes::splat(0.0)) }, distance + radius)
     }
@@ -200,6 +206,20 @@ impl Distance for ToTriangle {
         let direction = [near_x, near_y, z];
         let distance = dot(direction, direction).sqrt();
         Away { distance, direction, length: distance }
+    }
+
+    #[inline(always)]
+    fn distance<const W: usize>(&self, p: [Lanes<W>; 3]) -> Lanes<W> {
+        let zero = Lanes::splat(0.0);
+        let [x, y, z] = self.frame.to_local(p);
+        let near_x = x - x.clamp(zero, Lanes::splat(self.base));
+        let (mut square, mut inside) = (near_x * near_x + y * y, y);
+        for edge in &self.sides {
+            let (_, _, edge_square, side) = edge.away(x, y);
+            square = square.min(edge_square);
+            inside = inside.min(side);
+        }
+        (inside.where_greater(zero, zero, square) + z * z).sqrt()
     }
 
     #[inline(always)]

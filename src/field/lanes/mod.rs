@@ -182,15 +182,22 @@ fn add_shape<S: Distance, const W: usize, const GRADIENT: bool>(blocks: &mut [Bl
     if S::TWO_PASSES {
         for block in blocks.iter_mut() {
             compiler_fence(Ordering::SeqCst);
-            block.away = shape.away(block.point);
+            if GRADIENT {
+                block.away = shape.away(block.point);
+            } else {
+                block.away.distance = shape.distance(block.point);
+            }
         }
     }
     for block in blocks {
         compiler_fence(Ordering::SeqCst);
-        let away = if S::TWO_PASSES { block.away } else { shape.away(block.point) };
-        let (value, slope) = falloff.value_slope(away.distance, S::SOLID);
-        block.value = block.value + value;
-        if GRADIENT {
+        if !GRADIENT {
+            let distance = if S::TWO_PASSES { block.away.distance } else { shape.distance(block.point) };
+            block.value = block.value + falloff.value_slope(distance, S::SOLID).0;
+        } else {
+            let away = if S::TWO_PASSES { block.away } else { shape.away(block.point) };
+            let (value, slope) = falloff.value_slope(away.distance, S::SOLID);
+            block.value = block.value + value;
             let scale = slope * falloff.inverse_length(away.length);
             let [x, y, z] = shape.to_world(away.direction);
             let [gx, gy, gz] = block.gradient;

@@ -5,7 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::base::{Kind, Motion};
 use crate::coat::{Coat, seeds};
 use crate::field::{Placed, Shape};
-use crate::math::{Vec3, Wrench};
+use crate::math::{Twist, Vec3, Wrench};
+use crate::response::VelocityConvention;
 use crate::substance::Substance;
 use crate::substance::pieces::Findings;
 use crate::substance::swarm::{CROWD, Matter, Swarm};
@@ -19,6 +20,10 @@ use crate::world::{Body, Contact, LinkId, LogLevel, Scheme, SkeletonId, World};
 /// Looks at the volumes in one step, when a piece is farther off than this: squeezed within a step, it swells in the same.
 const LOOKS: usize = 6;
 const TOO_FAR: f64 = 0.015;
+/// Gain of volume control where something presses, over that of a free surface.
+const UNDER_PRESSURE: f64 = 0.1;
+/// Part of the surface that is enough to make good what all lack.
+const ENOUGH: f64 = 0.4;
 /// Particles that a worker measures at a time.
 const MEASURED: usize = 32;
 
@@ -64,10 +69,16 @@ impl World {
         self.gather_swarm(&mut system.swarm);
         self.gather_obstacles(&mut system, state, dt);
         let mut motions = state.motions.clone();
-        for obstacle in &system.obstacles {
-            for link in &obstacle.side.links {
-                self.support(*link, &mut motions[*link as usize]);
-            }
+        system.gather_links();
+        for link in &mut system.links {
+            let motion = &motions[link.slot as usize];
+            link.hold = self.hold(link.slot, motion);
+            // The velocity of a leapfrog host is half a step old, and it was taken on as if nothing held it.
+            let age = if self.is_leapfrog(link.slot) { 0.5 * dt } else { 0.0 };
+            let mut then = motion.twist;
+            then.linear -= motion.acceleration * age;
+            then.angular -= motion.angular_acceleration * age;
+            link.begin(then, age);
         }
         system.advance(&mut motions, dt, self.desc.substep_phase, self.desc.max_substeps, team);
         for (link, wrench) in system.carried.iter().enumerate() {
@@ -85,17 +96,29 @@ impl World {
         state.system = system;
     }
 
-    /// What holds a link that the library moves against what the substances do to it: the other contacts of the last
-    /// step. The implicit response knows only afterwards.
-    fn support(&self, link: u32, motion: &mut Motion) {
-        let Some(link) = self.links.is_live(link as usize).then(|| &self.links[link as usize]) else { return };
-        if matches!(link.desc.kind, Kind::Rigid | Kind::PointMass) && link.last_dt > 0.0 {
-            let mut other = link.contact_impulse;
-            other.add_scaled(&link.substance_impulse, -1.0);
-            let held = motion.answer(&other);
-            motion.acceleration += held.linear / link.last_dt;
-            motion.angular_acceleration += held.angular / link.last_dt;
+    /// What held a link in the last step against what the substances did to it, as an acceleration: other contacts,
+    /// which the response knows only afterwards, and what its host did by itself.
+    fn hold(&self, link: u32, motion: &Motion) -> Twist {
+        let link = &self.links[link as usize];
+        if link.desc.kind == Kind::Fixed || link.last_dt <= 0.0 {
+            return Twist::default();
         }
+        let mut other = link.contact_impulse;
+        other.add_scaled(&link.substance_impulse, -1.0);
+        let mut hold = motion.answer(&other);
+        hold.linear /= link.last_dt;
+        hold.angular /= link.last_dt;
+        if link.desc.kind == Kind::Host {
+            let own = link.mirror.own_doing(&self.host(link), link.last_dt);
+            hold.linear += own.linear;
+            hold.angular += own.angular;
+        }
+        hold
+    }
+
+    fn is_leapfrog(&self, link: u32) -> bool {
+        let desc = &self.links[link as usize].desc;
+        desc.kind == Kind::Host && desc.velocity_convention == VelocityConvention::Leapfrog
     }
 
     fn gather_swarm(&self, swarm: &mut Swarm) {
@@ -221,9 +244,11 @@ impl World {
         for matter in &swarm.matters {
             let Some(substance) = self.bodies[matter.body as usize].substance.as_deref_mut() else { continue };
             let own = first..first + substance.particles.len();
-            let (offsets, labels) = (&mut swarm.offset[own.clone()], &swarm.label[own.clone()]);
+            let labels = &swarm.label[own.clone()];
+            let pressed = &swarm.is_pressed[own.clone()];
+            let offsets = &mut swarm.offset[own.clone()];
             let thickness = matter.profile.thickness;
-            off.extend(substance.control_volume(&shares[own.clone()], thickness, labels, only, offsets));
+            off.extend(substance.control_volume(&shares[own.clone()], thickness, (labels, pressed), only, offsets));
             first = own.end;
         }
         off
@@ -308,18 +333,20 @@ impl World {
 
 impl Substance {
     /// The next offsets of its particles, so that each piece keeps its volume: what buried particles lack, those on the
-    /// surface make good: of some labels of the world, or of all. Gives those that were too far off.
+    /// surface make good: of some labels of the world, or of all. Gives those that were too far off. Where something
+    /// presses the surface follows slowly, and the free one makes good what is missing meanwhile: the volume errs whenever
+    /// a lump swings on what carries it, and coats that swell a little later than they are pressed drive that on.
     fn control_volume(
         &mut self,
         shares: &[Share],
         thickness: f64,
-        labels: &[u32],
+        (labels, pressed): (&[u32], &[bool]),
         only: Option<&Labels>,
         offsets: &mut [f64],
     ) -> Labels {
         let mut sums: BTreeMap<u32, Sums> = BTreeMap::new();
         let counts = |label: &u32| only.is_none_or(|only| only.contains(label));
-        for ((particle, share), label) in self.particles.iter_mut().zip(shares).zip(labels) {
+        for (((particle, share), label), pressed) in self.particles.iter_mut().zip(shares).zip(labels).zip(pressed) {
             if !counts(label) {
                 continue;
             }
@@ -327,31 +354,52 @@ impl Substance {
             let sums = sums.entry(*label).or_default();
             sums.target += target;
             sums.error += share.volume - target;
-            sums.surface += share.exposed;
-            if share.exposed <= 0.0 {
-                sums.lack += target - share.volume;
-            }
+            let group = match pressed {
+                _ if share.exposed <= 0.0 => &mut sums.buried,
+                true => &mut sums.pressed,
+                false => &mut sums.free,
+            };
+            *group = (group.0 + share.exposed, group.1 + target - share.volume);
         }
         let gain = self.desc.volume_gain;
         if gain == 0.0 {
             return Labels::new();
         }
-        for (((particle, share), label), offset) in self.particles.iter().zip(shares).zip(labels).zip(offsets) {
-            let Some(&Sums { lack, surface, .. }) = sums.get(label) else { continue };
-            let missing = if surface > 0.0 { lack / surface } else { 0.0 };
+        for (index, particle) in self.particles.iter().enumerate() {
+            let (share, label) = (&shares[index], &labels[index]);
+            let Some(sums) = sums.get(label) else { continue };
+            let patience = sums.patience();
             let target = particle.target.unwrap_or(share.volume);
-            *offset = next_offset(*offset, gain, share, target, missing, thickness);
+            let gain = gain * if pressed[index] { patience } else { 1.0 };
+            offsets[index] = next_offset(offsets[index], gain, share, target, sums.missing(patience), thickness);
         }
         let is_off = |sums: &Sums| sums.error.abs() > TOO_FAR * sums.target;
         sums.into_iter().filter(|(_, sums)| is_off(sums)).map(|(label, _)| label).collect()
     }
 }
 
-/// Of the particles of one label: volume that is wanted, how far they are off, what buried ones lack, and surface.
+/// Of the particles of one label: volume that is wanted, how far they are off; and of those that are buried, pressed, or
+/// free the surface, and what they lack.
 #[derive(Clone, Copy, Default)]
 struct Sums {
     target: f64,
     error: f64,
-    lack: f64,
-    surface: f64,
+    buried: (f64, f64),
+    pressed: (f64, f64),
+    free: (f64, f64),
+}
+
+impl Sums {
+    /// Gain where something presses over that of the free surface; where hardly any is free, all is alike.
+    fn patience(&self) -> f64 {
+        let part = self.free.0 / (self.free.0 + self.pressed.0).max(1e-300);
+        (1.0 - part / ENOUGH).max(UNDER_PRESSURE)
+    }
+
+    /// What the surface is to make good, as a length.
+    fn missing(&self, patience: f64) -> f64 {
+        let surface = self.free.0 + patience * self.pressed.0;
+        let lack = self.buried.1 + (1.0 - patience) * self.pressed.1;
+        if surface > 0.0 { lack / surface } else { 0.0 }
+    }
 }
