@@ -47,6 +47,27 @@ pub struct Side {
     pub stiffness_scale: f64,
     /// The body keeps its shape.
     pub rigid: bool,
+    /// Of many skeletons, where each has a field; of a few nothing, since to ask would cost what it saves.
+    balls: Vec<Ball>,
+}
+
+/// Skeletons of a side of which all are evaluated everywhere.
+const FEW: usize = 3;
+
+/// A ball outside which a skeleton has no field.
+#[derive(Clone, Copy, Debug)]
+struct Ball {
+    center: Vec3,
+    /// Of its radius \[m²\].
+    square: f64,
+}
+
+impl Ball {
+    fn around(skeleton: &Placed) -> Self {
+        // Somewhat larger: rounding must cost no field.
+        let radius = 1.000_001 * (skeleton.shape.half_extent() + skeleton.profile.radius);
+        Self { center: skeleton.shape.middle(), square: radius * radius }
+    }
 }
 
 impl Side {
@@ -60,18 +81,41 @@ impl Side {
         self.links.clear();
         self.reach.clear();
         self.poses.clear();
+        self.balls.clear();
     }
 
     /// `f - c` and its gradient.
     #[inline]
     pub fn excess(&self, p: &Vec3) -> (f64, Vec3) {
-        let (value, gradient) = blend::value_gradient(&self.skeletons, &self.graph, p);
+        let (value, gradient) = if self.balls.is_empty() {
+            blend::value_gradient(&self.skeletons, &self.graph, p)
+        } else {
+            blend::value_gradient_of(&self.graph, self.near(p), p)
+        };
         (value - self.isovalue, gradient)
     }
 
     fn excess_hessian(&self, p: &Vec3) -> (f64, Vec3, Mat3) {
-        let (value, gradient, hessian) = blend::value_gradient_hessian(&self.skeletons, &self.graph, p);
+        let (value, gradient, hessian) = if self.balls.is_empty() {
+            blend::value_gradient_hessian(&self.skeletons, &self.graph, p)
+        } else {
+            blend::value_gradient_hessian_of(&self.graph, self.near(p), p)
+        };
         (value - self.isovalue, gradient, hessian)
+    }
+
+    /// Of many skeletons those that may have a field at a point, with their positions.
+    fn near(&self, p: &Vec3) -> impl Iterator<Item = (usize, &Placed)> {
+        let p = *p;
+        let all = self.balls.iter().zip(&self.skeletons).enumerate();
+        all.filter(move |(_, (ball, _))| (p - ball.center).norm_squared() <= ball.square).map(|(i, (_, one))| (i, one))
+    }
+
+    fn find_balls(&mut self) {
+        self.balls.clear();
+        if self.skeletons.len() > FEW {
+            self.balls.extend(self.skeletons.iter().map(Ball::around));
+        }
     }
 
     /// Puts the skeletons where their links are, in a frame at `origin` with the world's axes.
@@ -81,6 +125,7 @@ impl Side {
             self.poses[index] = pose;
             self.skeletons[index].shape = self.locals[index].transformed(&pose);
         }
+        self.find_balls();
     }
 
     /// The only link of the side, when there is only one.
@@ -188,6 +233,8 @@ impl Sample {
 impl Pair {
     /// Sets the weights from the two sides. Call after filling them.
     pub fn prepare(&mut self) {
+        self.a.find_balls();
+        self.b.find_balls();
         let (ka, kb) = (self.a.stiffness_scale, self.b.stiffness_scale);
         // Beyond this ratio the surface is the stiffer body's to the last digits that matter.
         if !self.a.rigid && !self.b.rigid {

@@ -65,24 +65,22 @@ pub fn together(graph: &Graph, fields: impl Iterator<Item = (usize, f64)>) -> f6
 /// Field value and gradient of all skeletons together.
 #[inline]
 pub fn value_gradient(skeletons: &[Placed], graph: &Graph, p: &Vec3) -> (f64, Vec3) {
+    value_gradient_of(graph, skeletons.iter().enumerate(), p)
+}
+
+/// The same of some skeletons, given with their positions: the others' fields are zero at the point.
+#[inline]
+pub fn value_gradient_of<'a>(graph: &Graph, some: impl Iterator<Item = (usize, &'a Placed)>, p: &Vec3) -> (f64, Vec3) {
     if !graph.is_complete() {
-        return grouped_gradient(skeletons.iter().enumerate(), graph, p);
+        return grouped_gradient(some, graph, p);
     }
     let mut sum = (0.0, Vec3::zeros());
-    for skeleton in skeletons {
+    for (_, skeleton) in some {
         let (value, gradient) = skeleton.value_gradient(p);
         sum.0 += value;
         sum.1 += gradient;
     }
     sum
-}
-
-/// Gradient of some skeletons together, given with their positions: the others' fields are zero at the point.
-pub fn gradient_of<'a>(graph: &Graph, some: impl Iterator<Item = (usize, &'a Placed)>, p: &Vec3) -> Vec3 {
-    if graph.is_complete() {
-        return some.map(|(_, skeleton)| skeleton.value_gradient(p).1).sum();
-    }
-    grouped_gradient(some, graph, p).1
 }
 
 #[inline(never)]
@@ -154,11 +152,20 @@ pub fn evaluate(
 
 /// Field value, gradient and Hessian of all skeletons together.
 pub fn value_gradient_hessian(skeletons: &[Placed], graph: &Graph, p: &Vec3) -> (f64, Vec3, Mat3) {
+    value_gradient_hessian_of(graph, skeletons.iter().enumerate(), p)
+}
+
+/// The same of some skeletons, given with their positions: the others' fields are zero at the point.
+pub fn value_gradient_hessian_of<'a>(
+    graph: &Graph,
+    some: impl Iterator<Item = (usize, &'a Placed)>,
+    p: &Vec3,
+) -> (f64, Vec3, Mat3) {
     if !graph.is_complete() {
-        return grouped_hessian(skeletons, graph, p);
+        return grouped_hessian(some, graph, p);
     }
     let mut sum = (0.0, Vec3::zeros(), Mat3::zeros());
-    for skeleton in skeletons {
+    for (_, skeleton) in some {
         let (value, gradient, hessian) = skeleton.value_gradient_hessian(p);
         sum.0 += value;
         sum.1 += gradient;
@@ -167,12 +174,12 @@ pub fn value_gradient_hessian(skeletons: &[Placed], graph: &Graph, p: &Vec3) -> 
     sum
 }
 
-fn grouped_hessian(skeletons: &[Placed], graph: &Graph, p: &Vec3) -> (f64, Vec3, Mat3) {
+fn grouped_hessian<'a>(some: impl Iterator<Item = (usize, &'a Placed)>, graph: &Graph, p: &Vec3) -> (f64, Vec3, Mat3) {
     SCRATCH.with_borrow_mut(|Scratch { active, gradients, hessians, work, .. }| {
         active.clear();
         gradients.clear();
         hessians.clear();
-        for (index, skeleton) in skeletons.iter().enumerate() {
+        for (index, skeleton) in some {
             let (value, gradient, hessian) = skeleton.value_gradient_hessian(p);
             if value != 0.0 {
                 active.push((index, value));

@@ -237,6 +237,15 @@ impl Shape {
         }
     }
 
+    /// Half the largest extent of the shape: all of it is this near to its middle \[m\]; infinite for a plane.
+    pub fn half_extent(&self) -> f64 {
+        match self {
+            Shape::Box { half, .. } => half.norm(),
+            Shape::Plane { .. } => f64::INFINITY,
+            _ => self.corners().map(|corner| (corner - self.middle()).norm()).fold(0.0, f64::max),
+        }
+    }
+
     /// The corners of the shape; a point and a plane have none.
     pub fn corners(&self) -> impl Iterator<Item = Vec3> {
         let count = match self {

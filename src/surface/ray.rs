@@ -276,7 +276,7 @@ impl Work {
             }
         }
         if !coat.graph.is_complete() {
-            gradient = blend::gradient_of(&coat.graph, terms(), &position);
+            gradient = blend::value_gradient_of(&coat.graph, terms(), &position).1;
         }
         let normal = (-gradient).try_normalize(0.0).unwrap_or(-line.direction);
         Some(SurfaceHit { distance: (abreast + s).max(0.0), position, normal, skeleton: territory.0 })
