@@ -47,8 +47,8 @@ pub struct Side {
     pub stiffness_scale: f64,
     /// The body keeps its shape.
     pub rigid: bool,
-    /// Of many skeletons, where each has a field; of a few nothing, since to ask would cost what it saves.
-    balls: Vec<Ball>,
+    /// Of many skeletons, where each has a field, as placed last; of a few nothing, since to ask would cost what it saves.
+    pub balls: Vec<Ball>,
 }
 
 /// Skeletons of a side of which all are evaluated everywhere.
@@ -56,7 +56,7 @@ const FEW: usize = 3;
 
 /// A ball outside which a skeleton has no field.
 #[derive(Clone, Copy, Debug)]
-struct Ball {
+pub struct Ball {
     center: Vec3,
     /// Of its radius \[m²\].
     square: f64,
