@@ -316,3 +316,20 @@ fn a_face_on_the_floor_does_not_notice_a_hair_of_tilt() {
         }
     }
 }
+
+/// A bent limb comes closest to the floor at the far ends of its bones, and touches it at the joint too, where they
+/// blend: bristles tell the two patches of one bone apart.
+#[test]
+fn two_patches_of_the_same_skeletons_have_names_of_their_own() {
+    let bone = |x: f64| Shape::Segment(Vec3::zeros(), Vec3::new(x, 0.0, -0.028));
+    let limb = Coat::new(&[bone(-0.4), bone(0.4)], 0.1);
+    let pair = pair_of((&limb, &Pose::at(0.0, 0.0, 0.227)), (&Coat::floor(0.1), &Pose::default()), 1.0);
+    let mut surface = Surface::default();
+    integrate(&pair, &Settings { scheme: Scheme::Auto, tolerance: 5e-2 }, &mut surface);
+    let mut names: Vec<_> = surface.patches.iter().map(|patch| (patch.skeletons, patch.ordinal)).collect();
+    println!("{names:?}");
+    assert_eq!(names.len(), 3, "both ends and the joint");
+    names.sort_unstable();
+    names.dedup();
+    assert_eq!(names.len(), 3);
+}

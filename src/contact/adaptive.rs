@@ -91,6 +91,9 @@ pub struct Integrated {
     pub frame: Frame,
 }
 
+/// Sum of two unit normals below which they are opposite: no plane is between.
+const OPPOSITE: f64 = 0.1;
+
 /// How often the plane is turned towards a part of the surface that leans over.
 const MOST_TURNS: u32 = 2;
 
@@ -137,12 +140,17 @@ pub fn integrate(
         solver = work.solver;
         let Some(normal) = leans else { break error };
         // Round an edge, a plane half way between sees both sides.
-        if turns == MOST_TURNS {
+        let between = solver.frame.normal + normal;
+        if turns == MOST_TURNS || between.norm() < OPPOSITE {
             return Err(LeansOver { evaluations: solver.evaluations });
         }
         turns += 1;
-        solver.frame = solver.frame.facing(&(solver.frame.normal + normal));
+        solver.frame = solver.frame.facing(&between);
     };
+    if workspace.cells.is_empty() {
+        // Nothing of it is seen along the plane's normal.
+        return Err(LeansOver { evaluations: solver.evaluations });
+    }
     let (frame, evaluations) = (solver.frame, solver.evaluations);
     workspace.collect(pair, &frame, nodes);
     let first = cells.len();

@@ -53,7 +53,7 @@ impl Frame {
         (d.dot(&self.u) / self.scale[0], d.dot(&self.v) / self.scale[1], d.dot(&self.normal))
     }
 
-    /// The frame turned to have its heights along a direction, which is not across them.
+    /// The frame turned to have its heights along a direction, which is not against them.
     pub fn facing(&self, direction: &Vec3) -> Self {
         let normal = direction.normalize();
         let along = [self.u, self.v].map(|axis| axis - normal * axis.dot(&normal));

@@ -181,13 +181,13 @@ pub fn find(pair: &Pair, i: usize, j: usize, from: &Approach) -> Option<Deepest>
 }
 
 /// The surface near a point, where it is in contact.
-pub fn surface_near(pair: &Pair, i: usize, j: usize, position: &Vec3, evaluations: &mut u32) -> Option<Vec3> {
+pub fn surface_near(pair: &Pair, i: usize, j: usize, position: &Vec3, evaluations: &mut u32) -> Option<Deepest> {
     *evaluations += 1;
     if !pair.sample(position).is_pressed(touch(pair)) {
         return None;
     }
     let size = pair.a.skeletons[i].profile.thickness.min(pair.b.skeletons[j].profile.thickness);
-    fall(pair, [i, j], position, size, evaluations).map(|found| found.position)
+    fall(pair, [i, j], position, size, evaluations)
 }
 
 /// The highest `σ` on the whole contact surface: the most that the two coats together are compressed, in units of
@@ -196,8 +196,13 @@ pub fn greatest(pair: &Pair) -> f64 {
     let mut greatest = 0.0_f64;
     for i in 0..pair.a.skeletons.len() {
         for j in 0..pair.b.skeletons.len() {
+            let reach = pair.a.reach[i] + pair.b.reach[j];
             let from = approach(pair, i, j);
-            if from.distance < pair.a.reach[i] + pair.b.reach[j] {
+            if from.distance >= reach {
+                continue;
+            }
+            let corners = approaches_of_corners(pair, i, j).filter(|_| !pair.is_simple());
+            for from in std::iter::once(from).chain(corners.filter(|from| from.distance < reach)) {
                 greatest = find(pair, i, j, &from).map_or(greatest, |found| greatest.max(found.sum));
             }
         }

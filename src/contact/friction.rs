@@ -8,8 +8,8 @@ use crate::math::{Mat3, Vec3, Wrench, tangents};
 /// What a sticking patch remembers.
 #[derive(Clone, Copy, Debug)]
 pub struct Bristle {
-    /// The skeletons that name the patch, as slots of the world.
-    pub key: [u32; 2],
+    /// What names the patch, [`Patch::key`](super::patch::Patch::key).
+    pub key: [u32; 3],
     /// How far b has slipped over a since they stuck \[m\].
     pub slip: Vec3,
     /// How far it has turned about the normal \[rad\].
@@ -23,8 +23,8 @@ pub struct Bristle {
 /// Where a patch is, for its bristle.
 #[derive(Clone, Copy, Debug)]
 pub struct Place {
-    /// The skeletons that name the patch, as slots of the world.
-    pub key: [u32; 2],
+    /// What names the patch, [`Patch::key`](super::patch::Patch::key).
+    pub key: [u32; 3],
     /// Centre of pressure, in the pair's frame.
     pub position: Vec3,
     /// Mean normal, from a to b.

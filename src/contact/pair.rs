@@ -104,6 +104,15 @@ impl Side {
         (value - self.isovalue, gradient, hessian)
     }
 
+    /// Tells `part` which skeletons make the field at a point, and how much of it each.
+    pub fn parts(&self, p: &Vec3, part: impl FnMut(usize, f64)) {
+        if self.balls.is_empty() {
+            blend::parts(&self.graph, self.skeletons.iter().enumerate(), p, part);
+        } else {
+            blend::parts(&self.graph, self.near(p), p, part);
+        }
+    }
+
     /// Of many skeletons those that may have a field at a point, with their positions.
     fn near(&self, p: &Vec3) -> impl Iterator<Item = (usize, &Placed)> {
         let p = *p;
@@ -246,6 +255,12 @@ impl Pair {
             (true, false) => (1.0, 0.0, kb),
             _ => (ka / (ka + kb), kb / (ka + kb), ka * kb / (ka + kb)),
         };
+    }
+
+    /// Whether only one skeleton a side, and nothing between them, makes the contact: the distance of two convex shapes
+    /// has one minimum, and so has their contact one deepest point.
+    pub fn is_simple(&self) -> bool {
+        self.a.skeletons.len() == 1 && self.b.skeletons.len() == 1 && self.covers.is_empty()
     }
 
     /// Each side's share of the stiffness, `w_a` and `w_b`: that of a rigid side is 1.

@@ -1,6 +1,7 @@
 //! Patches: the pieces of contact surface that the schemes produce, as weighted points, and what they sum up to.
 
 use super::Scheme;
+use super::pair::Pair;
 use crate::math::Vec3;
 
 /// A weighted point of a contact surface, in the pair's frame.
@@ -29,6 +30,8 @@ impl Node {
 pub struct Patch {
     /// The skeletons whose territories hold the deepest point, as positions in the pair's sides.
     pub skeletons: [usize; 2],
+    /// How many patches of the same skeletons were found before it.
+    pub ordinal: u32,
     /// The deepest point, in the pair's frame.
     pub deepest: Vec3,
     /// The normal there, from a to b.
@@ -47,6 +50,14 @@ pub struct Patch {
     pub scheme: Scheme,
     /// Past the most that the contact can carry; see [`overload`](super::overload).
     pub overloaded: bool,
+}
+
+impl Patch {
+    /// What names the patch from step to step: the slots of its skeletons, and which of theirs it is.
+    pub fn key(&self, pair: &Pair) -> [u32; 3] {
+        let [i, j] = self.skeletons;
+        [pair.a.ids[i], pair.b.ids[j], self.ordinal]
+    }
 }
 
 /// Sums over nodes.

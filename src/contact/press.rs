@@ -4,7 +4,7 @@
 use super::pair::{Pair, Side};
 use super::patch::{self, Node, Sums};
 use crate::base::Motion;
-use crate::field::{Placed, blend};
+use crate::field::Placed;
 use crate::math::{Vec3, Wrench};
 
 /// How the surfaces of two bodies rub and damp.
@@ -53,7 +53,7 @@ fn share(side: &Side, position: &Vec3, out: &mut Vec<Share>) {
     }
     let mut total = 0.0;
     // Whose field has no part in the body's there, has none in the load, and must not be tied to it.
-    blend::parts(&side.skeletons, &side.graph, position, |index, weight| {
+    side.parts(position, |index, weight| {
         let link = side.links[index];
         total += weight;
         match out.iter_mut().find(|share| share.link == link) {
@@ -144,8 +144,8 @@ impl Carriers {
 pub struct Grip {
     /// Which candidate pair.
     pub candidate: usize,
-    /// The skeletons that name the patch, as slots of the world.
-    pub key: [u32; 2],
+    /// What names the patch, [`Patch::key`](super::patch::Patch::key).
+    pub key: [u32; 3],
     /// Centre of pressure, in the pair's frame.
     pub position: Vec3,
     /// Mean normal, from a to b.

@@ -25,7 +25,7 @@ pub struct Settings {
 /// The patches of a pair and their nodes. Kept between uses for its memory.
 #[derive(Debug, Default)]
 pub struct Surface {
-    /// The patches, the deepest first.
+    /// The patches, the deepest first; then those that lie beside the closest places.
     pub patches: Vec<Patch>,
     /// The nodes of all patches.
     pub nodes: Vec<Node>,
@@ -35,7 +35,10 @@ pub struct Surface {
     pub evaluations: u32,
     /// What the last integration found, the deepest first.
     pub(super) maxima: Vec<Deepest>,
+    /// The region of each patch.
     covered: Vec<Covered>,
+    /// Skeletons within reach of each other.
+    close: Vec<(usize, usize)>,
     borders: Vec<f64>,
     cells: Vec<(i32, i32)>,
     outlines: Vec<(f64, f64)>,
@@ -66,6 +69,7 @@ pub fn integrate(pair: &Pair, settings: &Settings, out: &mut Surface) {
     out.overloads.clear();
     out.maxima.clear();
     out.covered.clear();
+    out.close.clear();
     out.borders.clear();
     out.cells.clear();
     out.outlines.clear();
@@ -94,6 +98,7 @@ fn find_patches(pair: &Pair, settings: &Settings, out: &mut Surface) -> Option<(
             if approach.distance >= pair.a.reach[i] + pair.b.reach[j] {
                 continue;
             }
+            out.close.push((i, j));
             let (ta, tb) = (pair.a.skeletons[i].profile.thickness, pair.b.skeletons[j].profile.thickness);
             let overlap = (ta + tb - approach.distance) / ta.min(tb);
             // Where a neighbour lies between two parts of a body, these may be as close as they like.
@@ -127,7 +132,7 @@ fn find_patches(pair: &Pair, settings: &Settings, out: &mut Surface) -> Option<(
     let extent = extent(&pair.a).min(extent(&pair.b));
     let held = (0..out.maxima.len()).all(|index| {
         let at = out.maxima[index];
-        out.holds(&at.position) || patch(pair, settings, &at, extent, out)
+        out.holder(&at.position, &at.normal).is_some() || patch(pair, settings, &at, extent, out)
     });
     if !(held && find_missed(pair, settings, extent, out)) {
         // The surface wraps round: no plane sees all of it, the seeds do.
@@ -142,29 +147,35 @@ fn find_patches(pair: &Pair, settings: &Settings, out: &mut Surface) -> Option<(
 /// closest, but where others blend with them, their coats may touch at more: at the corners of either. And a patch that
 /// was taken for star-shaped may go on behind a bay. False when a surface leans over.
 fn find_missed(pair: &Pair, settings: &Settings, extent: f64, out: &mut Surface) -> bool {
-    if pair.a.skeletons.len() == 1 && pair.b.skeletons.len() == 1 {
-        // The distance of convex cores has one minimum.
+    if pair.is_simple() {
         return true;
     }
-    for i in 0..pair.a.skeletons.len() {
-        for j in 0..pair.b.skeletons.len() {
-            for from in deepest::approaches_of_corners(pair, i, j) {
-                if from.distance >= pair.a.reach[i] + pair.b.reach[j] || out.holds(&from.meeting) {
-                    continue;
-                }
-                let meeting = deepest::surface_near(pair, i, j, &from.meeting, &mut out.evaluations);
-                let Some(meeting) = meeting.filter(|at| !out.holds(at)) else { continue };
-                let Some(at) = deepest::find(pair, i, j, &Approach { meeting, ..from }) else { continue };
-                out.evaluations += at.evaluations;
+    for index in 0..out.close.len() {
+        let (i, j) = out.close[index];
+        for from in deepest::approaches_of_corners(pair, i, j) {
+            if from.distance >= pair.a.reach[i] + pair.b.reach[j]
+                || out.holder(&from.meeting, &from.direction).is_some()
+            {
+                continue;
+            }
+            let Some(near) = deepest::surface_near(pair, i, j, &from.meeting, &mut out.evaluations) else { continue };
+            if out.holder(&near.position, &near.normal).is_some() {
+                continue;
+            }
+            let from = Approach { meeting: near.position, ..from };
+            let Some(at) = deepest::find(pair, i, j, &from) else { continue };
+            out.evaluations += at.evaluations;
+            let settings = match out.holder(&at.position, &at.normal) {
+                None => *settings,
+                // Cells have all that hangs together.
+                Some(Covered::Cells(..)) => continue,
+                Some(_) if settings.scheme == Scheme::Polar => continue,
                 // Up there is a patch that left this out.
-                let settings = match (out.holds(&at.position), settings.scheme) {
-                    (false, _) => *settings,
-                    (true, Scheme::Auto | Scheme::ClosedForm) => Settings { scheme: Scheme::Adaptive, ..*settings },
-                    (true, _) => continue,
-                };
-                if !patch(pair, &settings, &at, extent, out) {
-                    return false;
-                }
+                Some(_) => Settings { scheme: Scheme::Adaptive, ..*settings },
+            };
+            out.maxima.push(at);
+            if !patch(pair, &settings, &at, extent, out) {
+                return false;
             }
         }
     }
@@ -172,9 +183,13 @@ fn find_missed(pair: &Pair, settings: &Settings, extent: f64, out: &mut Surface)
 }
 
 impl Surface {
-    /// Whether a point of the surface lies within a region.
-    fn contains(&self, region: &Covered, p: &Vec3) -> bool {
+    /// Whether a point of the surface, with its normal, lies within a region.
+    fn contains(&self, region: &Covered, p: &Vec3, normal: &Vec3) -> bool {
         let (Covered::Polar(frame, range) | Covered::Cells(frame, range) | Covered::Outline(frame, range)) = region;
+        // The other side of something thin is another contact.
+        if frame.normal.dot(normal) <= 0.0 {
+            return false;
+        }
         let (x, y, height) = frame.coordinates(p);
         let size = frame.scale[0].max(frame.scale[1]);
         match region {
@@ -189,8 +204,8 @@ impl Surface {
             }
             Covered::Cells(..) => {
                 let cells = &self.cells[range.0..range.1];
-                let reach = cells.iter().map(|(i, j)| i.abs().max(j.abs())).max().unwrap_or(0);
-                cells.binary_search(&adaptive::grid_cell(x, y)).is_ok() && height.abs() < size * f64::from(reach + 1)
+                let reach = || cells.iter().map(|(i, j)| i.abs().max(j.abs())).max().unwrap_or(0);
+                cells.binary_search(&adaptive::grid_cell(x, y)).is_ok() && height.abs() < size * f64::from(reach() + 1)
             }
             Covered::Outline(..) => {
                 let outline = &self.outlines[range.0..range.1];
@@ -207,16 +222,18 @@ impl Surface {
         }
     }
 
-    /// Whether a point of the surface lies within a patch.
-    fn holds(&self, p: &Vec3) -> bool {
-        self.covered.iter().any(|region| self.contains(region, p))
+    /// The region of the patch that a point of the surface, with its normal, lies in.
+    fn holder(&self, p: &Vec3, normal: &Vec3) -> Option<&Covered> {
+        self.covered.iter().find(|region| self.contains(region, p, normal))
     }
 
-    /// Notes the region of the last patch, and drops the patches before that it holds too: they would count twice.
+    /// Notes the region of the last patch, and drops the patches before that it holds too, with theirs: they would count
+    /// twice.
     fn cover(&mut self, region: Covered) {
         let last = self.patches.len() - 1;
         for index in (0..last).rev() {
-            if self.contains(&region, &self.patches[index].deepest) {
+            if self.contains(&region, &self.patches[index].deepest, &self.patches[index].normal) {
+                self.covered.remove(index);
                 let (first, end) = self.patches.remove(index).nodes;
                 self.nodes.drain(first..end);
                 for patch in &mut self.patches[index..] {
@@ -234,9 +251,12 @@ impl Surface {
 
     /// Adds a patch whose nodes start at `first`.
     pub fn push(&mut self, at: &Deepest, first: usize, scale: f64, error: f64, evaluations: u32, scheme: Scheme) {
+        let same = self.patches.iter().filter(|patch| patch.skeletons == at.skeletons);
+        let ordinal = same.map(|patch| patch.ordinal + 1).max().unwrap_or(0);
         let overloaded = self.overloads.iter().any(|(i, j, _)| [*i, *j] == at.skeletons);
         self.patches.push(Patch {
             skeletons: at.skeletons,
+            ordinal,
             deepest: at.position,
             normal: at.normal,
             peak_pressure: scale * at.sum,
@@ -257,8 +277,7 @@ fn patch(pair: &Pair, settings: &Settings, at: &Deepest, extent: f64, out: &mut 
     let (first_border, first_cell) = (out.borders.len(), out.cells.len());
     let mut spent = 0;
     // Where skeletons blend, the surface has more than one face, and what lies between them may be missed.
-    let alone = pair.a.skeletons.len() == 1 && pair.b.skeletons.len() == 1 && pair.covers.is_empty();
-    let facets = alone && !matches!(settings.scheme, Scheme::Polar | Scheme::Adaptive);
+    let facets = pair.is_simple() && !matches!(settings.scheme, Scheme::Polar | Scheme::Adaptive);
     if facets {
         let first_corner = out.outlines.len();
         match facets::integrate(pair, at, settings.tolerance, &mut out.pieces, &mut out.nodes, &mut out.outlines) {
@@ -276,7 +295,7 @@ fn patch(pair: &Pair, settings: &Settings, at: &Deepest, extent: f64, out: &mut 
             Ok(done) => {
                 let region = Covered::Polar(done.frame, (first_border, out.borders.len()));
                 // A border that was searched too far out may be another patch's.
-                if out.contains(&region, &at.position) {
+                if out.contains(&region, &at.position, &at.normal) {
                     out.push(at, first, pair.scale, done.error, done.evaluations + spent, Scheme::Polar);
                     out.cover(region);
                     return true;

@@ -25,9 +25,15 @@ thread_local! {
     static SCRATCH: RefCell<Scratch> = RefCell::default();
 }
 
-/// Tells `part` which skeletons make the field at a point, and how much of it each: `f_i ∂f/∂f_i`.
-pub fn parts(skeletons: &[Placed], graph: &Graph, p: &Vec3, mut part: impl FnMut(usize, f64)) {
-    let fields = skeletons.iter().enumerate().map(|(index, skeleton)| (index, skeleton.value(p)));
+/// Tells `part` which of some skeletons, given with their positions, make the field at a point, and how much of it each:
+/// `f_i ∂f/∂f_i`. The others' fields are zero there.
+pub fn parts<'a>(
+    graph: &Graph,
+    some: impl Iterator<Item = (usize, &'a Placed)>,
+    p: &Vec3,
+    mut part: impl FnMut(usize, f64),
+) {
+    let fields = some.map(|(index, skeleton)| (index, skeleton.value(p)));
     let mut fields = fields.filter(|(_, value)| *value != 0.0);
     if graph.is_complete() {
         return fields.for_each(|(index, value)| part(index, value));

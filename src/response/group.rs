@@ -409,7 +409,6 @@ impl Question<'_> {
                     ll -= slip * (slip * spared).transpose();
                 }
                 ll += Mat3::from_diagonal_element(along);
-                // Torque by velocity; force by turn is its transpose.
                 // Torque by velocity, by columns and by rows; force by turn is its transpose.
                 let [a, b, c] = [arm.cross(&ll.column(0)), arm.cross(&ll.column(1)), arm.cross(&ll.column(2))];
                 let rows = [Vec3::new(a.x, b.x, c.x), Vec3::new(a.y, b.y, c.y), Vec3::new(a.z, b.z, c.z)];

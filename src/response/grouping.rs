@@ -131,7 +131,7 @@ impl Grouping<'_> {
         }
         let [i, j] = patch.skeletons;
         let thickness = thinner(pair, i, j);
-        let key = [pair.a.ids[i], pair.b.ids[j]];
+        let key = patch.key(pair);
         let mut grip = Grip {
             coefficient: material.friction,
             creep: CREEP * thickness,

@@ -503,7 +503,7 @@ impl Solver {
                 continue;
             }
             let [i, j] = patch.skeletons;
-            let key = [pair.a.ids[i], pair.b.ids[j]];
+            let key = patch.key(pair);
             let Some(bristle) = memory.bristles.iter_mut().find(|bristle| bristle.key == key) else { continue };
             let thickness = thinner(pair, i, j);
             self.carriers.find(pair, &load.center);

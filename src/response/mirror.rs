@@ -100,6 +100,8 @@ impl Mirror {
     /// host. None is needed, and none given, without contact.
     pub fn leave(&mut self, host: &Host, motion: &Motion, center: &Vec3, rotation: &Quat, dt: f64) -> Wrench {
         if !motion.touched && !self.active {
+            // What was expected after the last contact says nothing of a later one.
+            self.bypassed = None;
             return Wrench::default();
         }
         let mean = Twist {
@@ -142,6 +144,11 @@ impl Mirror {
     /// Whether the host did not do what an impulse was to bring: it is held, or pushed hard.
     pub fn is_doubtful(&self) -> bool {
         self.doubt > 0
+    }
+
+    /// Whether the library's own velocities stand in for the host's.
+    pub fn is_active(&self) -> bool {
+        self.active
     }
 
     /// What the host did by itself in the last tick, of this length, as an acceleration; none where that is not known.

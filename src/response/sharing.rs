@@ -107,10 +107,10 @@ fn are_one(a: &Share, b: &Share) -> bool {
 
 /// Whether the same links have nearly the same shares.
 fn alike(some: &[Share], others: &[Share]) -> bool {
-    let rounded = |share: &Share| (share.weight * STEPS).round();
+    // Both are of one side, and so of one sign.
+    let rounded = |share: &Share| (share.weight.abs() * STEPS + 0.5) as u32;
     let within = |some: &[Share], others: &[Share]| {
-        some.iter()
-            .all(|share| rounded(share) == others.iter().find(|other| are_one(other, share)).map_or(0.0, rounded))
+        some.iter().all(|share| rounded(share) == others.iter().find(|other| are_one(other, share)).map_or(0, rounded))
     };
     within(some, others) && within(others, some)
 }

@@ -122,11 +122,6 @@ pub(super) fn drift(motions: &mut [Motion], island: &Island, h: f64) {
     }
 }
 
-/// The slots of the skeletons that name a patch.
-fn key(pair: &Pair, patch: &patch::Patch) -> [u32; 2] {
-    [pair.a.ids[patch.skeletons[0]], pair.b.ids[patch.skeletons[1]]]
-}
-
 pub(super) fn bend_bristles(candidate: &mut Candidate, motions: &[Motion], h: f64, carriers: &mut Carriers) {
     let Candidate { pair, surface, nodes, memory, .. } = candidate;
     for bristle in &mut memory.bristles {
@@ -138,7 +133,7 @@ pub(super) fn bend_bristles(candidate: &mut Candidate, motions: &[Motion], h: f6
         if size > 0.0 {
             let normal = sums.force / size;
             carriers.find(pair, &sums.center);
-            let place = friction::Place { key: key(pair, patch), position: sums.center, normal };
+            let place = friction::Place { key: patch.key(pair), position: sums.center, normal };
             friction::bend(&mut memory.bristles, &place, carriers, motions, &pair.origin, h);
         }
     }
@@ -161,7 +156,7 @@ fn press_candidate(candidate: &mut Candidate, index: usize, motions: &mut [Motio
         if load > 0.0 && (material.friction > 0.0 || material.static_friction > 0.0) {
             work.grips.push(Grip {
                 candidate: index,
-                key: key(pair, patch),
+                key: patch.key(pair),
                 position: sums.center,
                 normal: sums.force / load,
                 load,

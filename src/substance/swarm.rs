@@ -61,7 +61,7 @@ pub struct Swarm {
     pub label: Vec<u32>,
     /// Which matter.
     pub kind: Vec<u16>,
-    /// Something pressed on it at the end of the last step.
+    /// Something pressed on it in the last sub-step.
     pub is_pressed: Vec<bool>,
     /// Who is near.
     pub near: Neighbours,

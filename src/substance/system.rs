@@ -167,7 +167,11 @@ impl System {
         self.swarm.is_pressed.clear();
         self.swarm.is_pressed.resize(self.swarm.place.len(), false);
         for load in &self.loads {
-            self.swarm.is_pressed[load.particle as usize] |= load.press.push != Vec3::zeros();
+            let is_pressed = &mut self.swarm.is_pressed;
+            if load.press.push != Vec3::zeros() {
+                is_pressed[load.particle as usize] = true;
+                load.carriers.iter().for_each(|(carrier, _)| is_pressed[*carrier as usize] = true);
+            }
         }
     }
 
@@ -340,7 +344,7 @@ impl System {
             let change = [twist.linear - held_at.linear, twist.angular - held_at.angular];
             let [linear, angular] = [0, 1].map(|part| {
                 let direction = [&hold.linear, &hold.angular][part].try_normalize(0.0).unwrap_or_else(Vec3::zeros);
-                let back = (-change[part].dot(&direction)).clamp(0.0, left[part]);
+                let back = (-change[part].dot(&direction)).max(0.0).min(left[part]);
                 left[part] -= back;
                 direction * back
             });

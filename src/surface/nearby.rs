@@ -39,7 +39,9 @@ impl<'a> Nearby<'a> {
         let mut shares = std::mem::take(&mut self.shares);
         shares.clear();
         let (small, near) = self.at(p);
-        blend::parts(&small.skeletons, &small.graph, p, |index, part| shares.push((near[index], part)));
+        blend::parts(&small.graph, small.skeletons.iter().enumerate(), p, |index, part| {
+            shares.push((near[index], part))
+        });
         let sum: f64 = shares.iter().map(|(_, part)| part).sum();
         if sum > 0.0 {
             shares.iter_mut().for_each(|(_, share)| *share /= sum);

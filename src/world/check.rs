@@ -114,7 +114,7 @@ impl World {
                 return refuse("the rate is not a number of at least 0");
             }
             for Bristle { key, slip, turn, sliding: _, seen: _ } in bristles {
-                if key.iter().any(|skeleton| *skeleton as usize >= self.skeletons.capacity()) {
+                if key[..2].iter().any(|skeleton| *skeleton as usize >= self.skeletons.capacity()) {
                     return refuse("a bristle between skeletons that have never been");
                 }
                 if !crate::math::is_finite(slip) || !turn.is_finite() {

@@ -78,7 +78,7 @@ impl Skin {
             let (small, near) = nearby.at(position);
             let first = skin.weights.len();
             let mut sum = 0.0;
-            blend::parts(&small.skeletons, &small.graph, position, |index, part| {
+            blend::parts(&small.graph, small.skeletons.iter().enumerate(), position, |index, part| {
                 let link = links[near[index] as usize];
                 sum += part;
                 match skin.weights[first..].iter_mut().find(|(other, _)| *other == link) {

@@ -63,6 +63,11 @@ impl World {
         }
         self.wake_substances(state, dt);
         if self.substances().next().is_none() {
+            for slot in 0..self.links.capacity() {
+                if let Some(link) = self.links.at_mut(slot) {
+                    link.substance_impulse = Wrench::default();
+                }
+            }
             return;
         }
         let mut system = std::mem::take(&mut state.system);
@@ -73,7 +78,7 @@ impl World {
         for link in &mut system.links {
             let motion = &motions[link.slot as usize];
             link.hold = self.hold(link.slot, motion);
-            // The velocity of a leapfrog host is half a step old, and it was taken on as if nothing held it.
+            // The velocity of a leapfrog host is half a step old, and it was taken on as if nothing held it; a mirror's is not.
             let age = if self.is_leapfrog(link.slot) { 0.5 * dt } else { 0.0 };
             let mut then = motion.twist;
             then.linear -= motion.acceleration * age;
@@ -116,9 +121,11 @@ impl World {
         hold
     }
 
+    /// Whether the velocity that a step takes on from a link's host is half a step old.
     fn is_leapfrog(&self, link: u32) -> bool {
-        let desc = &self.links[link as usize].desc;
-        desc.kind == Kind::Host && desc.velocity_convention == VelocityConvention::Leapfrog
+        let link = &self.links[link as usize];
+        let desc = &link.desc;
+        desc.kind == Kind::Host && desc.velocity_convention == VelocityConvention::Leapfrog && !link.mirror.is_active()
     }
 
     fn gather_swarm(&self, swarm: &mut Swarm) {

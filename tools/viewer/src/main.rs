@@ -379,8 +379,9 @@ mod tests {
     }
 
     /// The file of a recording, read back: the document and its binary part.
-    fn animated() -> (gltf::Gltf, Vec<u8>) {
-        let path = std::env::temp_dir().join(format!("isocoat-view-{}.glb", std::process::id()));
+    fn animated(name: &str) -> (gltf::Gltf, Vec<u8>) {
+        // Tests run side by side in one process.
+        let path = std::env::temp_dir().join(format!("isocoat-view-{}-{name}.glb", std::process::id()));
         let options = Options { cell: Some(0.03), ..Options::default() };
         animate(&mut recording(), &[0, 1, 2], &options, &path).unwrap();
         let bytes = std::fs::read(&path).unwrap();
@@ -415,7 +416,7 @@ mod tests {
 
     #[test]
     fn a_body_of_many_links_is_one_mesh_that_its_joints_carry() {
-        let (read, blob) = animated();
+        let (read, blob) = animated("skin");
         let node = read.nodes().find(|node| node.skin().is_some()).unwrap();
         let skin = node.skin().unwrap();
         let joints: Vec<_> = skin.joints().collect();
@@ -461,7 +462,7 @@ mod tests {
 
     #[test]
     fn a_body_of_one_link_moves_as_a_node() {
-        let (read, blob) = animated();
+        let (read, blob) = animated("node");
         let node = read.nodes().find(|node| node.mesh().is_some() && node.skin().is_none()).unwrap();
         for key in 0..TIMES.len() {
             let expected = matrix([0.0, 1.0, key as f32], [0.0, 0.0, 0.0, 1.0]);
