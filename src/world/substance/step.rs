@@ -20,8 +20,11 @@ use crate::world::{Body, Contact, LinkId, LogLevel, Scheme, SkeletonId, World};
 /// Looks at the volumes in one step, when a piece is farther off than this: squeezed within a step, it swells in the same.
 const LOOKS: usize = 6;
 const TOO_FAR: f64 = 0.015;
-/// Gain of volume control where something presses, over that of a free surface.
+/// Gain of volume control where something presses, over that of a free surface: of lumps of so many particles it is this
+/// low, and of smaller ones higher. The larger a lump, the more slowly it swings, and coats that follow faster than it
+/// swings drive it on.
 const UNDER_PRESSURE: f64 = 0.1;
+const LARGE: f64 = 10_000.0;
 /// Part of the surface that is enough to make good what all lack.
 const ENOUGH: f64 = 0.4;
 /// Particles that a worker measures at a time.
@@ -359,6 +362,7 @@ impl Substance {
             }
             let target = *particle.target.get_or_insert(share.volume);
             let sums = sums.entry(*label).or_default();
+            sums.count += 1;
             sums.target += target;
             sums.error += share.volume - target;
             let group = match pressed {
@@ -385,10 +389,11 @@ impl Substance {
     }
 }
 
-/// Of the particles of one label: volume that is wanted, how far they are off; and of those that are buried, pressed, or
+/// Of the particles of one label: how many, volume that is wanted, how far they are off; and of those that are buried, pressed, or
 /// free the surface, and what they lack.
 #[derive(Clone, Copy, Default)]
 struct Sums {
+    count: u32,
     target: f64,
     error: f64,
     buried: (f64, f64),
@@ -400,7 +405,8 @@ impl Sums {
     /// Gain where something presses over that of the free surface; where hardly any is free, all is alike.
     fn patience(&self) -> f64 {
         let part = self.free.0 / (self.free.0 + self.pressed.0).max(1e-300);
-        (1.0 - part / ENOUGH).max(UNDER_PRESSURE)
+        let least = UNDER_PRESSURE * (LARGE / f64::from(self.count)).max(1.0);
+        (1.0 - part / ENOUGH).max(least.min(1.0))
     }
 
     /// What the surface is to make good, as a length.
