@@ -47,7 +47,8 @@ pub struct Side {
     pub stiffness_scale: f64,
     /// The body keeps its shape.
     pub rigid: bool,
-    /// Of many skeletons, where each has a field, as placed last; of a few nothing, since to ask would cost what it saves.
+    /// Of many skeletons, where each has a field, as placed last; of a few nothing, since to ask would cost what it
+    /// saves.
     pub balls: Vec<Ball>,
 }
 
@@ -87,37 +88,26 @@ impl Side {
     /// `f - c` and its gradient.
     #[inline]
     pub fn excess(&self, p: &Vec3) -> (f64, Vec3) {
-        let (value, gradient) = if self.balls.is_empty() {
-            blend::value_gradient(&self.skeletons, &self.graph, p)
-        } else {
-            blend::value_gradient_of(&self.graph, self.near(p), p)
-        };
+        let (value, gradient) = blend::value_gradient_of(&self.graph, self.near(p), p);
         (value - self.isovalue, gradient)
     }
 
     fn excess_hessian(&self, p: &Vec3) -> (f64, Vec3, Mat3) {
-        let (value, gradient, hessian) = if self.balls.is_empty() {
-            blend::value_gradient_hessian(&self.skeletons, &self.graph, p)
-        } else {
-            blend::value_gradient_hessian_of(&self.graph, self.near(p), p)
-        };
+        let (value, gradient, hessian) = blend::value_gradient_hessian_of(&self.graph, self.near(p), p);
         (value - self.isovalue, gradient, hessian)
     }
 
     /// Tells `part` which skeletons make the field at a point, and how much of it each.
     pub fn parts(&self, p: &Vec3, part: impl FnMut(usize, f64)) {
-        if self.balls.is_empty() {
-            blend::parts(&self.graph, self.skeletons.iter().enumerate(), p, part);
-        } else {
-            blend::parts(&self.graph, self.near(p), p, part);
-        }
+        blend::parts(&self.graph, self.near(p), p, part);
     }
 
-    /// Of many skeletons those that may have a field at a point, with their positions.
+    /// The skeletons that may have a field at a point, with their positions: of few, all.
+    #[inline]
     fn near(&self, p: &Vec3) -> impl Iterator<Item = (usize, &Placed)> {
         let p = *p;
-        let all = self.balls.iter().zip(&self.skeletons).enumerate();
-        all.filter(move |(_, (ball, _))| (p - ball.center).norm_squared() <= ball.square).map(|(i, (_, one))| (i, one))
+        let reaches = move |ball: &Ball| (p - ball.center).norm_squared() <= ball.square;
+        self.skeletons.iter().enumerate().filter(move |(index, _)| self.balls.get(*index).is_none_or(reaches))
     }
 
     fn find_balls(&mut self) {
@@ -242,8 +232,6 @@ impl Sample {
 impl Pair {
     /// Sets the weights from the two sides. Call after filling them.
     pub fn prepare(&mut self) {
-        self.a.find_balls();
-        self.b.find_balls();
         let (ka, kb) = (self.a.stiffness_scale, self.b.stiffness_scale);
         // Beyond this ratio the surface is the stiffer body's to the last digits that matter.
         if !self.a.rigid && !self.b.rigid {

@@ -492,6 +492,7 @@ impl World {
             let host = if hosted { self.host(&self.links[index]) } else { Host::default() };
             let link = &mut self.links[index];
             link.contact_impulse = motion.contact_impulse;
+            link.substance_impulse = state.system.carried.get(index).copied().unwrap_or_default();
             link.last_dt = dt;
             link.host_impulse = Wrench::default();
             match link.desc.kind {

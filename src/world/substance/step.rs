@@ -66,11 +66,7 @@ impl World {
         }
         self.wake_substances(state, dt);
         if self.substances().next().is_none() {
-            for slot in 0..self.links.capacity() {
-                if let Some(link) = self.links.at_mut(slot) {
-                    link.substance_impulse = Wrench::default();
-                }
-            }
+            state.system.carried.clear();
             return;
         }
         let mut system = std::mem::take(&mut state.system);
@@ -80,8 +76,8 @@ impl World {
         system.gather_links();
         for link in &mut system.links {
             let motion = &motions[link.slot as usize];
-            link.hold = self.hold(link.slot, motion);
-            // The velocity of a leapfrog host is half a step old, and it was taken on as if nothing held it; a mirror's is not.
+            link.hold = self.what_held(link.slot, motion);
+            // The velocity of a leapfrog host is half a step old, and it was taken on as if nothing held it.
             let age = if self.is_leapfrog(link.slot) { 0.5 * dt } else { 0.0 };
             let mut then = motion.twist;
             then.linear -= motion.acceleration * age;
@@ -94,11 +90,6 @@ impl World {
                 state.motions[link].push(wrench);
             }
         }
-        for index in 0..self.links.capacity() {
-            if let Some(link) = self.links.at_mut(index) {
-                link.substance_impulse = system.carried[index];
-            }
-        }
         self.list_contacts(&system, &motions, state);
         self.settle_substances(&mut system, dt, team);
         state.system = system;
@@ -106,7 +97,7 @@ impl World {
 
     /// What held a link in the last step against what the substances did to it, as an acceleration: other contacts,
     /// which the response knows only afterwards, and what its host did by itself.
-    fn hold(&self, link: u32, motion: &Motion) -> Twist {
+    fn what_held(&self, link: u32, motion: &Motion) -> Twist {
         let link = &self.links[link as usize];
         if link.desc.kind == Kind::Fixed || link.last_dt <= 0.0 {
             return Twist::default();
@@ -389,8 +380,8 @@ impl Substance {
     }
 }
 
-/// Of the particles of one label: how many, volume that is wanted, how far they are off; and of those that are buried, pressed, or
-/// free the surface, and what they lack.
+/// Of the particles of one label: how many, volume that is wanted, how far they are off; and of those that are buried,
+/// pressed, or free the surface, and what they lack.
 #[derive(Clone, Copy, Default)]
 struct Sums {
     count: u32,
