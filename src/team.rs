@@ -45,25 +45,34 @@ pub trait Tasks: Send {
 /// Looks for work after which an idle helper lets other threads have its core.
 const PATIENCE: u32 = 10_000;
 
-/// Who works at a step.
-pub struct Team {
-    helpers: usize,
+/// Who works at a step: the thread that steps, and perhaps a crew.
+pub struct Team<'a> {
+    crew: Option<&'a Crew>,
+}
+
+/// The thread that steps and those who help it.
+///
+/// Handing a job over takes as long as two cores take to tell each other two things. So every worker has a share of the
+/// blocks, in the same place each time, and counts them on a line of memory of its own; only who is through with its
+/// share looks at those of others, and does what they have not begun.
+struct Crew {
+    workers: usize,
     main: usize,
+    /// Helpers that came.
+    arrived: AtomicUsize,
     /// A job is being done; what is asked for meanwhile, its asker does alone.
     busy: AtomicBool,
     job: Line<Job>,
-    /// Blocks of the job that are done.
-    done: Line<AtomicUsize>,
-    /// Read all the time by those who look for work, and written once.
-    stopped: Line<AtomicBool>,
+    /// Of each worker's share: number of the job in the upper half, blocks begun and blocks done in the quarters of the
+    /// lower. One with the number of another job has begun nothing.
+    shares: [Line<AtomicU64>; MOST_WORKERS],
     panic: Mutex<Option<Box<dyn Any + Send>>>,
 }
 
 /// A job, together, so that who looks for work gets it at once.
 #[derive(Default)]
 struct Job {
-    /// Number of the job in the upper half; the blocks that nobody has taken, from which one and up to which one, in
-    /// the quarters of the lower.
+    /// Number of the job in the upper half, how many blocks it has in the lower; or [`OVER`].
     open: AtomicU64,
     /// A closure and who can call it, how many places it has, and how many of them make a block. Changed only while no
     /// block is open or at work.
@@ -81,6 +90,9 @@ struct Line<T>(T);
 /// Most blocks of a job.
 const MOST_BLOCKS: usize = u16::MAX as usize;
 
+/// In place of a job, when the step is over.
+const OVER: u64 = u64::MAX;
+
 /// What tells threads apart that live at the same time. The standard library's own id asks for memory, which a thread of
 /// the host may never give back.
 fn this_thread() -> usize {
@@ -92,47 +104,17 @@ fn this_thread() -> usize {
 
 type Caller = unsafe fn(*const (), Range<usize>);
 
-impl Team {
-    /// The thread that steps, alone.
-    pub fn alone() -> Self {
-        Self::new(0)
-    }
-
-    fn new(helpers: usize) -> Self {
+impl Crew {
+    fn new(workers: usize) -> Self {
         Self {
-            helpers,
+            workers,
             main: this_thread(),
+            arrived: AtomicUsize::new(0),
             busy: AtomicBool::new(false),
             job: Line::default(),
-            done: Line::default(),
-            stopped: Line::default(),
+            shares: [const { Line(AtomicU64::new(0)) }; MOST_WORKERS],
             panic: Mutex::new(None),
         }
-    }
-
-    /// Does `work` with a team of the host's threads.
-    pub fn with(tasks: Option<&mut (dyn Tasks + 'static)>, work: impl FnOnce(&Team)) {
-        let workers = tasks.as_ref().map_or(1, |tasks| tasks.workers().clamp(1, MOST_WORKERS));
-        let team = Team::new(workers - 1);
-        let mut work = Some(work);
-        let mut main = || {
-            // Helpers go home even if the work panics.
-            let _stop = Stop(&team);
-            if let Some(work) = work.take() {
-                work(&team);
-            }
-        };
-        match tasks {
-            Some(tasks) if workers > 1 => tasks.join(workers - 1, &|| team.help(), &mut main),
-            _ => {}
-        }
-        // Nothing is left to do, unless the host did not call it.
-        main();
-    }
-
-    /// Workers at most.
-    pub fn workers(&self) -> usize {
-        self.helpers + 1
     }
 
     /// What a helper does, until the work of the step is done.
@@ -141,10 +123,19 @@ impl Team {
         if this_thread() == self.main {
             return;
         }
-        let mut idle = 0;
-        while !self.stopped.0.load(Ordering::Acquire) {
-            if self.take_block(true) {
-                idle = 0;
+        let own = 1 + self.arrived.fetch_add(1, Ordering::Relaxed);
+        if own >= self.workers {
+            return;
+        }
+        let (mut last, mut idle) = (0, 0);
+        loop {
+            let open = self.job.0.open.load(Ordering::Acquire);
+            if open == OVER {
+                return;
+            }
+            if open != last {
+                self.take_blocks(own, open);
+                (last, idle) = (open, 0);
             } else if idle < PATIENCE {
                 idle += 1;
                 std::hint::spin_loop();
@@ -154,6 +145,110 @@ impl Team {
         }
     }
 
+    /// Does a job, together with who comes.
+    fn work_at<F: Fn(Range<usize>) + Sync>(&self, count: usize, block: usize, blocks: usize, work: &F) {
+        unsafe fn call<F: Fn(Range<usize>)>(work: *const (), range: Range<usize>) {
+            // SAFETY: `work` is the closure of this type that `work_at` has published; see `take_block`.
+            unsafe { (*work.cast::<F>())(range) }
+        }
+        let job = &self.job.0;
+        job.closure.store(std::ptr::from_ref(work).cast_mut().cast(), Ordering::Relaxed);
+        job.caller.store(call::<F> as Caller as *mut (), Ordering::Relaxed);
+        job.count.store(count, Ordering::Relaxed);
+        job.block.store(block, Ordering::Relaxed);
+        let number = ((job.open.load(Ordering::Relaxed) >> 32) as u32).wrapping_add(1);
+        let open = u64::from(number) << 32 | blocks as u64;
+        job.open.store(open, Ordering::Release);
+        self.take_blocks(0, open);
+        for (share, line) in self.shares[..self.workers].iter().enumerate() {
+            let size = self.share_of(share, blocks).len() as u64;
+            let done = u64::from(number) << 32 | size << 16 | size;
+            let mut waited = 0;
+            while size > 0 && line.0.load(Ordering::Acquire) != done {
+                waited += 1;
+                if waited < PATIENCE { std::hint::spin_loop() } else { std::thread::yield_now() }
+            }
+        }
+    }
+
+    /// The blocks that are a worker's to begin with.
+    fn share_of(&self, worker: usize, blocks: usize) -> Range<usize> {
+        worker * blocks / self.workers..(worker + 1) * blocks / self.workers
+    }
+
+    /// Does what nobody has begun of a job: first of the worker's own share, then of the others'.
+    fn take_blocks(&self, own: usize, open: u64) {
+        for share in (own..self.workers).chain(0..own) {
+            while self.take_block(share, open) {}
+        }
+    }
+
+    /// Does one block of a share. False when all are begun, or the job is no longer the one that is open.
+    fn take_block(&self, share: usize, open: u64) -> bool {
+        let (number, blocks) = ((open >> 32) as u32, open as u32 as usize);
+        let range = self.share_of(share, blocks);
+        let line = &self.shares[share].0;
+        let mut word = line.load(Ordering::Relaxed);
+        let index = loop {
+            let ahead = ((word >> 32) as u32).wrapping_sub(number) as i32;
+            let (begun, done) = if ahead == 0 { (word >> 16 & 0xffff, word & 0xffff) } else { (0, 0) };
+            if ahead > 0 || begun as usize == range.len() {
+                return false;
+            }
+            let next = u64::from(number) << 32 | (begun + 1) << 16 | done;
+            match line.compare_exchange_weak(word, next, Ordering::Acquire, Ordering::Relaxed) {
+                Ok(_) => break range.start + begun as usize,
+                Err(now) => word = now,
+            }
+        };
+        // The job is still open: before another one is, each share that has blocks bears this one's number, all begun
+        // and all done, and this block is not done yet. So what is read here belongs to it.
+        let job = &self.job.0;
+        let (closure, caller) = (job.closure.load(Ordering::Relaxed), job.caller.load(Ordering::Relaxed));
+        let (count, block) = (job.count.load(Ordering::Relaxed), job.block.load(Ordering::Relaxed));
+        let first = index * block;
+        // SAFETY: `caller` is a `Caller`: only `work_at` stores there, before the job is opened.
+        let caller = unsafe { std::mem::transmute::<*mut (), Caller>(caller) };
+        // SAFETY: `work_at` does not return before this block is done, so that the closure is still there. It is `Sync`,
+        // so that it may be called from here.
+        let result = catch_unwind(AssertUnwindSafe(|| unsafe { caller(closure, first..count.min(first + block)) }));
+        if let Err(panic) = result {
+            *self.panic.lock().unwrap_or_else(|poisoned| poisoned.into_inner()) = Some(panic);
+        }
+        line.fetch_add(1, Ordering::Release);
+        true
+    }
+}
+
+impl Team<'_> {
+    /// The thread that steps, alone.
+    pub fn alone() -> Self {
+        Self { crew: None }
+    }
+
+    /// Does `work` with a team of the host's threads.
+    pub fn with(tasks: Option<&mut (dyn Tasks + 'static)>, work: impl FnOnce(&Team)) {
+        let workers = tasks.as_ref().map_or(1, |tasks| tasks.workers().clamp(1, MOST_WORKERS));
+        let Some(tasks) = tasks.filter(|_| workers > 1) else { return work(&Team::alone()) };
+        let crew = Crew::new(workers);
+        let mut work = Some(work);
+        let mut main = || {
+            // Helpers go home even if the work panics.
+            let _stop = Stop(&crew);
+            if let Some(work) = work.take() {
+                work(&Team { crew: Some(&crew) });
+            }
+        };
+        tasks.join(workers - 1, &|| crew.help(), &mut main);
+        // Nothing is left to do, unless the host did not call it.
+        main();
+    }
+
+    /// Workers at most.
+    pub fn workers(&self) -> usize {
+        self.crew.map_or(1, |crew| crew.workers)
+    }
+
     /// A size of blocks for `count` places of equal work, of at least `least`.
     pub fn share(&self, count: usize, least: usize) -> usize {
         count.div_ceil(2 * self.workers()).max(least)
@@ -161,70 +256,21 @@ impl Team {
 
     /// Calls `work` with ranges that make up `0..count`, of `block` places but for the last.
     pub fn each(&self, count: usize, block: usize, work: impl Fn(Range<usize>) + Sync) {
-        self.each_of(count, block, &work);
-    }
-
-    fn each_of<F: Fn(Range<usize>) + Sync>(&self, count: usize, block: usize, work: &F) {
-        unsafe fn call<F: Fn(Range<usize>)>(work: *const (), range: Range<usize>) {
-            // SAFETY: `work` is the closure of this type that `each_of` has published; see `take_block`.
-            unsafe { (*work.cast::<F>())(range) }
-        }
         let block = block.max(count.div_ceil(MOST_BLOCKS));
         let blocks = count.div_ceil(block);
-        if blocks < 2 || self.helpers == 0 || self.busy.swap(true, Ordering::Relaxed) {
+        let free = |crew: &&Crew| blocks > 1 && !crew.busy.swap(true, Ordering::Relaxed);
+        let Some(crew) = self.crew.filter(free) else {
             if count > 0 {
                 work(0..count);
             }
             return;
-        }
-        self.done.0.store(0, Ordering::Relaxed);
-        let job = &self.job.0;
-        job.closure.store(std::ptr::from_ref(work).cast_mut().cast(), Ordering::Relaxed);
-        job.caller.store(call::<F> as Caller as *mut (), Ordering::Relaxed);
-        job.count.store(count, Ordering::Relaxed);
-        job.block.store(block, Ordering::Relaxed);
-        let number = (job.open.load(Ordering::Relaxed) >> 32) + 1;
-        job.open.store(number << 32 | blocks as u64, Ordering::Release);
-        while self.take_block(false) {}
-        let mut waited = 0;
-        while self.done.0.load(Ordering::Acquire) < blocks {
-            waited += 1;
-            if waited < PATIENCE { std::hint::spin_loop() } else { std::thread::yield_now() }
-        }
-        self.busy.store(false, Ordering::Relaxed);
-        let panic = self.panic.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).take();
+        };
+        crew.work_at(count, block, blocks, &work);
+        crew.busy.store(false, Ordering::Relaxed);
+        let panic = crew.panic.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).take();
         if let Some(panic) = panic {
             resume_unwind(panic);
         }
-    }
-
-    /// Does one block, from one end or the other: who always takes the same end finds its own work of the last job in its
-    /// cache. False when none is open.
-    fn take_block(&self, last: bool) -> bool {
-        let job = &self.job.0;
-        let open = job.open.load(Ordering::Acquire);
-        let (low, high) = ((open >> 16 & 0xffff) as usize, (open & 0xffff) as usize);
-        if low == high {
-            return false;
-        }
-        let (index, rest) = if last { (high - 1, open - 1) } else { (low, open + (1 << 16)) };
-        let (closure, caller) = (job.closure.load(Ordering::Relaxed), job.caller.load(Ordering::Relaxed));
-        let (count, block) = (job.count.load(Ordering::Relaxed), job.block.load(Ordering::Relaxed));
-        if job.open.compare_exchange(open, rest, Ordering::Acquire, Ordering::Relaxed).is_err() {
-            return true;
-        }
-        let first = index * block;
-        // SAFETY: `caller` is a `Caller`: only `each_of` stores there, before the job is opened.
-        let caller = unsafe { std::mem::transmute::<*mut (), Caller>(caller) };
-        // SAFETY: the four belong to the job whose block was taken: `each_of` changes them only when all blocks of the
-        // last job are done, and this one counts as done below. For the same reason the closure is still there. It is
-        // `Sync`, so that it may be called from here.
-        let result = catch_unwind(AssertUnwindSafe(|| unsafe { caller(closure, first..count.min(first + block)) }));
-        if let Err(panic) = result {
-            *self.panic.lock().unwrap_or_else(|poisoned| poisoned.into_inner()) = Some(panic);
-        }
-        self.done.0.fetch_add(1, Ordering::Release);
-        true
     }
 
     /// Calls `work` for each item, with its position.
@@ -239,23 +285,26 @@ impl Team {
         });
     }
 
-    /// Calls `work` for each `size` items in a row, with the number of the row; what it gives goes to `results`.
+    /// Calls `work` for each `size` items in a row, with the number of the row and its result. Each worker
+    /// has as many rows in one go as there are for it: where this is a matter of microseconds, what it had in its cache
+    /// counts for more than who is done first.
     pub fn each_row<T: Send, R: Send>(
         &self,
         items: &mut [T],
         size: usize,
         results: &mut [R],
-        work: impl Fn(usize, &mut [T]) -> R + Sync,
+        work: impl Fn(usize, &mut [T], &mut R) + Sync,
     ) {
         let count = items.len();
         assert_eq!(results.len(), count.div_ceil(size), "a result for each row");
         let all = Shared(items.as_mut_ptr());
-        self.each_mut(results, self.share(count.div_ceil(size), 1), |row, result| {
+        let block = count.div_ceil(size).div_ceil(self.workers()).max(1);
+        self.each_mut(results, block, |row, result| {
             let (first, end) = (row * size, count.min((row + 1) * size));
             // SAFETY: within the slice, which is borrowed until `each_mut` is done; rows do not overlap, and each goes
             // with one result, so that nobody else has these items.
             let items = unsafe { std::slice::from_raw_parts_mut(all.at(first), end - first) };
-            *result = work(row, items);
+            work(row, items, result);
         });
     }
 
@@ -289,11 +338,11 @@ impl<T> Alone<T> {
 }
 
 /// Lets the helpers go when dropped.
-struct Stop<'a>(&'a Team);
+struct Stop<'a>(&'a Crew);
 
 impl Drop for Stop<'_> {
     fn drop(&mut self) {
-        self.0.stopped.0.store(true, Ordering::Release);
+        self.0.job.0.open.store(OVER, Ordering::Release);
     }
 }
 
@@ -354,9 +403,9 @@ mod tests {
         for workers in [1, 2, 5] {
             Team::with(Some(&mut Threads(workers)), |team| {
                 let (mut items, mut sums) = ([1u32; 50], [0u32; 8]);
-                team.each_row(&mut items, 7, &mut sums, |row, items| {
+                team.each_row(&mut items, 7, &mut sums, |row, items, sum| {
                     items.iter_mut().for_each(|item| *item += row as u32);
-                    items.iter().sum()
+                    *sum = items.iter().sum();
                 });
                 assert_eq!(sums, std::array::from_fn(|row| (row as u32 + 1) * if row == 7 { 1 } else { 7 }));
             });

@@ -9,6 +9,10 @@ pub struct Bounds {
     pub low: Vec3,
     /// Highest coordinates.
     pub high: Vec3,
+    /// Middle of a ball that bounds it too: of round bodies that lie askew to each other, boxes meet where they don't.
+    pub middle: Vec3,
+    /// Radius of that ball; infinite where a box is closer.
+    pub radius: f64,
     /// Slot of the body.
     pub body: u32,
 }
@@ -16,6 +20,7 @@ pub struct Bounds {
 impl Bounds {
     fn meets(&self, other: &Bounds) -> bool {
         (0..3).all(|axis| self.low[axis] <= other.high[axis] && other.low[axis] <= self.high[axis])
+            && (self.middle - other.middle).norm() <= self.radius + other.radius
     }
 }
 
@@ -68,9 +73,11 @@ mod tests {
             let mut bounds: Vec<_> = boxes.iter().enumerate().map(|(body, (low, size, plane))| {
                 let (low, size) = (Vec3::from(*low), Vec3::from(*size));
                 let infinite = Vec3::repeat(f64::INFINITY);
+                let (middle, body) = (low + size * 0.5, body as u32);
                 match plane {
-                    0 => Bounds { low: -infinite, high: infinite, body: body as u32 },
-                    _ => Bounds { low, high: low + size, body: body as u32 },
+                    0 => Bounds { low: -infinite, high: infinite, middle, radius: f64::INFINITY, body },
+                    1..10 => Bounds { low, high: low + size, middle, radius: f64::INFINITY, body },
+                    _ => Bounds { low, high: low + size, middle, radius: 0.5 * size.max(), body },
                 }
             }).collect();
             let mut expected = Vec::new();

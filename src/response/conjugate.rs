@@ -1,8 +1,18 @@
 //! Conjugate gradients on a symmetric positive definite system of blocks: for islands whose factor would be wide.
 //!
-//! Each link's own block is the preconditioner, which takes masses, lengths and stiffnesses of any ratio out of the
-//! count; what remains goes with the longest way through the island. Written after Chronopoulos and Gear (1989): both sums
-//! of an iteration are made at once, so that workers wait for each other twice in it, and not three times.
+//! With the matrix scaled so that each link's own block is one, which takes masses, lengths and stiffnesses of any ratio
+//! out of the count, it is `1 + L + Lᵀ + R`: what couples the links of a chunk, below and above the diagonal, and what
+//! couples different chunks. The preconditioner is symmetric Gauss-Seidel within chunks, `(1 + L)(1 + L)ᵀ`: it passes a
+//! push on through a whole chunk, and costs no product of its own, because (Eisenstat 1981)
+//!
+//! ```text
+//! (1 + L)⁻¹ (1 + L + Lᵀ + R) (1 + L)⁻ᵀ r = t + (1 + L)⁻¹ (r - t + R t),    t = (1 + L)⁻ᵀ r
+//! ```
+//!
+//! Both sums of an iteration are made at once (Chronopoulos and Gear 1989), so that workers, who have whole chunks, wait
+//! for each other twice in it, and not three times.
+
+use std::ops::Range;
 
 use nalgebra::Matrix6;
 
@@ -10,19 +20,43 @@ use super::envelope::BLOCK;
 use crate::field::lanes::{Dispatch, Kernel};
 use crate::team::Team;
 
+/// Rows that one worker has: always as many, so that the bits do not depend on who works.
+const CHUNK: usize = 64;
+
 /// The system: each row of blocks has the one on the diagonal, and its couplings on both sides of it.
 #[derive(Debug, Default)]
 pub struct Blocks {
-    /// Where each row's couplings begin, and where the last one's end.
-    starts: Vec<u32>,
-    /// The other row of each coupling.
+    /// The couplings of all rows, in the order in which they were made.
+    entries: Vec<Block>,
+    /// The other row of each.
+    others: Vec<u32>,
+    matrix: Matrix,
+    rows: Vec<Row>,
+    /// `t` of each row that another chunk reads.
+    shared: Vec<[Column; CHUNK]>,
+    sums: Vec<Sums>,
+}
+
+/// The scaled matrix without its diagonal; what couples rows of one chunk with its sign turned.
+#[derive(Debug, Default)]
+struct Matrix {
+    /// Where each class of each row's couplings ends.
+    ends: Vec<[u32; 3]>,
+    /// Row by row and class by class: which coupling, its other row, and its block.
+    sources: Vec<u32>,
     others: Vec<u32>,
     entries: Vec<Block>,
-    rows: Vec<Row>,
-    /// What is left of each row, preconditioned: the rows' own, for all to read.
-    eased: Vec<Column>,
-    /// Two sums over some rows each.
-    sums: Vec<[f64; 2]>,
+}
+
+/// Where the other row of a coupling is.
+#[derive(Clone, Copy)]
+enum Class {
+    /// Earlier in the chunk.
+    Lower,
+    /// Later in the chunk.
+    Upper,
+    /// In another chunk.
+    Far,
 }
 
 /// Six numbers, and two zeros that fill the register.
@@ -38,10 +72,17 @@ impl Column {
     }
 
     #[inline(always)]
-    fn dot(&self, other: &Self) -> f64 {
-        let products: [f64; 8] = std::array::from_fn(|lane| self.0[lane] * other.0[lane]);
-        let halves: [f64; 4] = std::array::from_fn(|lane| products[lane] + products[lane + 4]);
+    fn sum(&self) -> f64 {
+        let halves: [f64; 4] = std::array::from_fn(|lane| self.0[lane] + self.0[lane + 4]);
         (halves[0] + halves[2]) + (halves[1] + halves[3])
+    }
+
+    /// Adds the products of the numbers at the same places.
+    #[inline(always)]
+    fn add_product(&mut self, a: &Self, b: &Self) {
+        for (sum, (a, b)) in self.0.iter_mut().zip(a.0.iter().zip(&b.0)) {
+            *sum += a * b;
+        }
     }
 
     #[inline(always)]
@@ -50,6 +91,22 @@ impl Column {
             *x += other * factor;
         }
     }
+
+    #[inline(always)]
+    fn plus(mut self, other: &Self, factor: f64) -> Self {
+        self.add_scaled(other, factor);
+        self
+    }
+}
+
+/// The sums of a chunk, by themselves: workers who write to one line of memory wait for each other.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(align(128))]
+struct Sums {
+    /// Of the square of what is left.
+    size: f64,
+    /// Of what is left times its image.
+    bend: f64,
 }
 
 /// A block of the matrix, by columns.
@@ -62,38 +119,30 @@ impl Block {
         Self(std::array::from_fn(|column| Column::of(matrix.column(column).as_slice())))
     }
 
-    /// The inverse of a symmetric positive definite matrix, by its Cholesky factor; `None` when it is not one.
-    fn inverse_of(matrix: &Matrix6<f64>) -> Option<Self> {
-        // The factor's inverse, below the diagonal, row by row.
+    /// The inverse of the Cholesky factor of a symmetric positive definite matrix; `None` when it is not one.
+    fn inverse_factor_of(matrix: &Matrix6<f64>) -> Option<Self> {
         let mut factor = [[0.0; BLOCK]; BLOCK];
-        let mut inverse = [[0.0; BLOCK]; BLOCK];
+        let mut inverse = Self::default();
         for i in 0..BLOCK {
             for j in 0..i {
                 let sum: f64 = (0..j).map(|k| factor[i][k] * factor[j][k]).sum();
-                factor[i][j] = (matrix[(i, j)] - sum) * inverse[j][j];
+                factor[i][j] = (matrix[(i, j)] - sum) * inverse.0[j].0[j];
             }
             let pivot = matrix[(i, i)] - factor[i][..i].iter().map(|x| x * x).sum::<f64>();
             if pivot.is_nan() || pivot <= 0.0 {
                 return None;
             }
-            inverse[i][i] = 1.0 / pivot.sqrt();
+            let own = 1.0 / pivot.sqrt();
+            inverse.0[i].0[i] = own;
             for j in 0..i {
-                let sum: f64 = (j..i).map(|k| factor[i][k] * inverse[k][j]).sum();
-                inverse[i][j] = -sum * inverse[i][i];
+                let sum: f64 = (j..i).map(|k| factor[i][k] * inverse.0[j].0[k]).sum();
+                inverse.0[j].0[i] = -sum * own;
             }
         }
-        let mut block = Self::default();
-        for i in 0..BLOCK {
-            for j in 0..=i {
-                let entry: f64 = (i..BLOCK).map(|k| inverse[k][i] * inverse[k][j]).sum();
-                block.0[j].0[i] = entry;
-                block.0[i].0[j] = entry;
-            }
-        }
-        Some(block)
+        Some(inverse)
     }
 
-    /// Adds the product with `x`, in two strands that do not wait for each other.
+    /// The product with `x`, in two strands that do not wait for each other.
     #[inline(always)]
     fn add_product(&self, x: &Column, strands: &mut [Column; 2]) {
         for (columns, x) in self.0.chunks_exact(2).zip(x.0.chunks_exact(2)) {
@@ -108,41 +157,62 @@ impl Block {
         self.add_product(x, &mut strands);
         joined(strands)
     }
+
+    /// The product of the transpose with `x`.
+    fn transposed_product(&self, x: &Column) -> Column {
+        let mut product = Column::default();
+        for (sum, column) in product.0.iter_mut().zip(&self.0) {
+            let mut products = Column::default();
+            products.add_product(column, x);
+            *sum = products.sum();
+        }
+        product
+    }
+
+    /// `left self rightᵀ` times a factor, where `right` has nothing above its diagonal.
+    fn between(&self, left: &Self, right: &Self, factor: f64) -> Self {
+        let mut sums = Self::default();
+        for (middle, (column, weights)) in self.0.iter().zip(&right.0).enumerate() {
+            let scaled = left.product(column);
+            for (sum, weight) in sums.0.iter_mut().zip(&weights.0).skip(middle) {
+                sum.add_scaled(&scaled, factor * weight);
+            }
+        }
+        sums
+    }
 }
 
 #[inline(always)]
-fn joined([mut sum, other]: [Column; 2]) -> Column {
-    sum.add_scaled(&other, 1.0);
-    sum
+fn joined([sum, other]: [Column; 2]) -> Column {
+    sum.plus(&other, 1.0)
 }
 
 /// What the iteration keeps of a row of blocks.
 #[derive(Clone, Copy, Debug, Default)]
 struct Row {
-    diagonal: Block,
-    inverse: Block,
-    x: Column,
+    /// Inverse of its own block's Cholesky factor.
+    scale: Block,
+    /// Of the unknowns times `(1 + L)ᵀ`.
+    y: Column,
     residual: Column,
-    /// What is left, preconditioned.
-    eased: Column,
     direction: Column,
-    /// The matrix times what is left, and times the direction.
+    /// `t`.
+    turned: Column,
+    /// The image of what is left, less `t`; the image of the direction.
     image: Column,
     direction_image: Column,
 }
 
-/// Rows whose part of a sum is made by one worker: always as many, so that sums do not depend on who makes them.
-const ROWS: usize = 16;
-
 /// Blocks from which on two workers are quicker than one, who waits for nobody twice in each iteration.
-const WORTH_SHARING: usize = 3000;
+const WORTH_SHARING: usize = 400;
 
 impl Blocks {
     /// No rows.
     pub fn clear(&mut self) {
-        self.starts.clear();
-        self.starts.push(0);
         self.others.clear();
+        self.matrix.ends.clear();
+        self.matrix.sources.clear();
+        self.matrix.others.clear();
     }
 
     /// Couples the row that is being made with another.
@@ -152,7 +222,27 @@ impl Blocks {
 
     /// Ends the row that is being made.
     pub fn end_row(&mut self) {
-        self.starts.push(self.others.len() as u32);
+        let Self { others, matrix, .. } = self;
+        let row = matrix.ends.len();
+        let chunk = row / CHUNK * CHUNK;
+        let range = matrix.sources.len()..others.len();
+        let is_near = |other: u32| (chunk..chunk + CHUNK).contains(&(other as usize));
+        let ends = [Class::Lower, Class::Upper, Class::Far].map(|class| {
+            for source in range.clone() {
+                let other = others[source];
+                let belongs = match class {
+                    Class::Lower => is_near(other) && (other as usize) < row,
+                    Class::Upper => is_near(other) && other as usize > row,
+                    Class::Far => !is_near(other),
+                };
+                if belongs {
+                    matrix.sources.push(source as u32);
+                    matrix.others.push(other);
+                }
+            }
+            matrix.sources.len() as u32
+        });
+        matrix.ends.push(ends);
     }
 
     /// The blocks of all couplings, in the order in which they were made.
@@ -162,7 +252,7 @@ impl Blocks {
     }
 
     /// Solves in place, to `tolerance` of the right side in the preconditioner's measure. Unless it is `fresh`, the
-    /// diagonal is that of the last call. False when a block of it is not positive definite.
+    /// matrix is that of the last call. False when a block of the diagonal is not positive definite.
     pub fn solve(
         &mut self,
         diagonal: &[Matrix6<f64>],
@@ -172,32 +262,33 @@ impl Blocks {
         most: usize,
         team: &Team,
     ) -> bool {
-        let Self { starts, others, entries, rows, eased, sums } = self;
+        let Self { entries, matrix, rows, shared, sums, .. } = self;
         let count = diagonal.len();
         let (alone, few) = (Team::alone(), entries.len() + count < WORTH_SHARING);
         let team = if few { &alone } else { team };
+        let dispatch = Dispatch::best();
         rows.resize(count, Row::default());
-        eased.resize(count, Column::default());
-        sums.resize(count.div_ceil(ROWS), [0.0; 2]);
-        let right = &*x;
-        team.each_row(rows, 1, eased, |index, row| {
-            let row = &mut row[0];
-            if fresh {
-                let none = || Block::of(&Matrix6::from_element(f64::NAN));
-                row.inverse = Block::inverse_of(&diagonal[index]).unwrap_or_else(none);
-                row.diagonal = Block::of(&diagonal[index]);
-            }
-            let residual = Column::of(&right[index * BLOCK..][..BLOCK]);
-            let eased = row.inverse.product(&residual);
-            *row = Row { diagonal: row.diagonal, inverse: row.inverse, residual, eased, ..Row::default() };
-            eased
-        });
-        let (mut first_size, mut last_size, mut part) = (0.0, f64::INFINITY, f64::INFINITY);
-        for iteration in 0..=most {
-            team.each_row(rows, ROWS, sums, |first, rows| {
-                Dispatch::best().run(Images { first: first * ROWS, rows, starts, others, entries, eased })
+        shared.resize(count.div_ceil(CHUNK), [Column::default(); CHUNK]);
+        sums.resize(count.div_ceil(CHUNK), Sums::default());
+        if fresh {
+            team.each_mut(rows, team.share(count, 1), |index, row| {
+                let none = || Block([Column([f64::NAN; 8]); BLOCK]);
+                row.scale = Block::inverse_factor_of(&diagonal[index]).unwrap_or_else(none);
             });
-            let size = sums.iter().map(|sums| sums[0]).sum::<f64>();
+            matrix.scale(entries, rows, team);
+        }
+        let matrix = &*matrix;
+        let right = &*x;
+        team.each_row(rows, CHUNK, shared, |chunk, rows, shared| {
+            dispatch.run(Begin { part: Part { matrix, first: chunk * CHUNK, rows }, right, shared });
+        });
+        let (mut first_size, mut last_size, mut length) = (0.0, f64::INFINITY, f64::INFINITY);
+        for iteration in 0..=most {
+            let all = shared.as_flattened();
+            team.each_row(rows, CHUNK, sums, |chunk, rows, sums| {
+                *sums = dispatch.run(Images { part: Part { matrix, first: chunk * CHUNK, rows }, shared: all });
+            });
+            let size = sums.iter().map(|sums| sums.size).sum::<f64>();
             if size.is_nan() {
                 return false;
             }
@@ -205,76 +296,167 @@ impl Blocks {
                 first_size = size;
             }
             let turn = size / last_size;
-            let bend = sums.iter().map(|sums| sums[1]).sum::<f64>() - turn * size / part;
+            let bend = sums.iter().map(|sums| sums.bend).sum::<f64>() - turn * size / length;
             if size <= tolerance * tolerance * first_size || bend <= 0.0 || iteration == most {
                 break;
             }
-            part = size / bend;
+            length = size / bend;
             last_size = size;
-            team.each_row(rows, 1, eased, |_, row| Dispatch::best().run(Advance { row: &mut row[0], turn, part }));
+            team.each_row(rows, CHUNK, shared, |chunk, rows, shared| {
+                dispatch.run(Advance { part: Part { matrix, first: chunk * CHUNK, rows }, shared, turn, length });
+            });
         }
+        team.each_row(rows, CHUNK, shared, |chunk, rows, shared| {
+            Part { matrix, first: chunk * CHUNK, rows }.turn_back(|row| row.y, shared);
+        });
         for (x, row) in x.chunks_exact_mut(BLOCK).zip(rows.iter()) {
-            x.copy_from_slice(&row.x.0[..BLOCK]);
+            x.copy_from_slice(&row.scale.transposed_product(&row.turned).0[..BLOCK]);
         }
         true
     }
 }
 
-/// The matrix times what is left of some rows, and two sums: of what is left, and of its image, times what is left
-/// preconditioned.
-struct Images<'a> {
-    first: usize,
-    rows: &'a mut [Row],
-    starts: &'a [u32],
-    others: &'a [u32],
-    entries: &'a [Block],
-    eased: &'a [Column],
-}
-
-impl Kernel for Images<'_> {
-    type Output = [f64; 2];
-
-    #[inline(always)]
-    fn run<const W: usize>(self) -> [f64; 2] {
-        let Self { first, rows, starts, others, entries, eased } = self;
-        let mut sums = [0.0; 2];
-        for (index, row) in rows.iter_mut().enumerate() {
-            let index = first + index;
-            let mut strands = [Column::default(); 2];
-            row.diagonal.add_product(&eased[index], &mut strands);
-            let range = starts[index] as usize..starts[index + 1] as usize;
-            for (entry, other) in entries[range.clone()].iter().zip(&others[range]) {
-                entry.add_product(&eased[*other as usize], &mut strands);
+impl Matrix {
+    /// Takes over the couplings, scaled.
+    fn scale(&mut self, entries: &[Block], rows: &[Row], team: &Team) {
+        let Self { ends, sources, others, entries: scaled } = self;
+        scaled.resize(sources.len(), Block::default());
+        let owner = |place: usize| ends.partition_point(|ends| ends[2] as usize <= place);
+        let all = &mut scaled[..];
+        let size = sources.len().div_ceil(2 * team.workers()).max(1);
+        team.each_row(all, size, &mut vec![(); sources.len().div_ceil(size)], |part, scaled, ()| {
+            let mut row = owner(part * size);
+            for (place, scaled) in (part * size..).zip(scaled) {
+                while ends[row][2] as usize <= place {
+                    row += 1;
+                }
+                let (left, right) = (&rows[row].scale, &rows[others[place] as usize].scale);
+                let sign = if place < ends[row][Class::Upper as usize] as usize { -1.0 } else { 1.0 };
+                *scaled = entries[sources[place] as usize].between(left, right, sign);
             }
-            row.image = joined(strands);
-            sums[0] += row.residual.dot(&eased[index]);
-            sums[1] += row.image.dot(&eased[index]);
+        });
+    }
+
+    /// The places of a row's couplings of one class.
+    #[inline(always)]
+    fn places(&self, row: usize, class: Class) -> Range<usize> {
+        let begin = match (class, row) {
+            (Class::Lower, 0) => 0,
+            (Class::Lower, _) => self.ends[row - 1][2],
+            _ => self.ends[row][class as usize - 1],
+        };
+        begin as usize..self.ends[row][class as usize] as usize
+    }
+
+    /// Adds a row's couplings of one class, times what `of` gives for the other row.
+    #[inline(always)]
+    fn add_products<'a>(&self, row: usize, class: Class, of: impl Fn(usize) -> &'a Column, strands: &mut [Column; 2]) {
+        let places = self.places(row, class);
+        for (entry, other) in self.entries[places.clone()].iter().zip(&self.others[places]) {
+            entry.add_product(of(*other as usize), strands);
         }
-        sums
     }
 }
 
-/// A step of a row along the new direction; gives what is left then, preconditioned.
+/// The rows of a chunk.
+struct Part<'a> {
+    matrix: &'a Matrix,
+    first: usize,
+    rows: &'a mut [Row],
+}
+
+impl Part<'_> {
+    /// Replaces `t` by `(1 + L)⁻ᵀ` of what is given for each row. Writing where others read is slow: only what another
+    /// chunk needs is shared.
+    #[inline(always)]
+    fn turn_back(self, of: impl Fn(&mut Row) -> Column, shared: &mut [Column]) {
+        let Self { matrix, first, rows } = self;
+        for place in (0..rows.len()).rev() {
+            let mut strands = [of(&mut rows[place]), Column::default()];
+            matrix.add_products(first + place, Class::Upper, |other| &rows[other - first].turned, &mut strands);
+            rows[place].turned = joined(strands);
+            if !matrix.places(first + place, Class::Far).is_empty() {
+                shared[place] = rows[place].turned;
+            }
+        }
+    }
+}
+
+/// What is left at the start, scaled and times `(1 + L)⁻¹`; and `t`.
+struct Begin<'a> {
+    part: Part<'a>,
+    right: &'a [f64],
+    shared: &'a mut [Column],
+}
+
+impl Kernel for Begin<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<const W: usize>(self) {
+        let Self { part, right, shared } = self;
+        let Part { matrix, first, .. } = part;
+        for place in 0..part.rows.len() {
+            let row = first + place;
+            let scale = part.rows[place].scale;
+            let mut strands = [Column::default(); 2];
+            scale.add_product(&Column::of(&right[row * BLOCK..][..BLOCK]), &mut strands);
+            matrix.add_products(row, Class::Lower, |other| &part.rows[other - first].residual, &mut strands);
+            part.rows[place] = Row { scale, residual: joined(strands), ..Row::default() };
+        }
+        part.turn_back(|row| row.residual, shared);
+    }
+}
+
+/// The image of what is left, and the sums.
+struct Images<'a> {
+    part: Part<'a>,
+    shared: &'a [Column],
+}
+
+impl Kernel for Images<'_> {
+    type Output = Sums;
+
+    #[inline(always)]
+    fn run<const W: usize>(self) -> Sums {
+        let Self { part: Part { matrix, first, rows }, shared } = self;
+        let (mut size, mut bend) = (Column::default(), Column::default());
+        for place in 0..rows.len() {
+            let Row { residual, turned, .. } = rows[place];
+            let mut strands = [residual.plus(&turned, -1.0), Column::default()];
+            matrix.add_products(first + place, Class::Far, |other| &shared[other], &mut strands);
+            matrix.add_products(first + place, Class::Lower, |other| &rows[other - first].image, &mut strands);
+            let image = joined(strands);
+            rows[place].image = image;
+            size.add_product(&residual, &residual);
+            bend.add_product(&residual, &image.plus(&turned, 1.0));
+        }
+        Sums { size: size.sum(), bend: bend.sum() }
+    }
+}
+
+/// A step along the new direction, and `t` of what is left then.
 struct Advance<'a> {
-    row: &'a mut Row,
+    part: Part<'a>,
+    shared: &'a mut [Column],
     turn: f64,
-    part: f64,
+    length: f64,
 }
 
 impl Kernel for Advance<'_> {
-    type Output = Column;
+    type Output = ();
 
     #[inline(always)]
-    fn run<const W: usize>(self) -> Column {
-        let Self { row, turn, part } = self;
-        for lane in 0..row.x.0.len() {
-            row.direction.0[lane] = row.eased.0[lane] + row.direction.0[lane] * turn;
-            row.direction_image.0[lane] = row.image.0[lane] + row.direction_image.0[lane] * turn;
-            row.x.0[lane] += row.direction.0[lane] * part;
-            row.residual.0[lane] -= row.direction_image.0[lane] * part;
-        }
-        row.eased = row.inverse.product(&row.residual);
-        row.eased
+    fn run<const W: usize>(self) {
+        let Self { part, shared, turn, length } = self;
+        let step = |row: &mut Row| {
+            row.direction = row.residual.plus(&row.direction, turn);
+            row.direction_image = row.image.plus(&row.turned, 1.0).plus(&row.direction_image, turn);
+            row.y.add_scaled(&row.direction, length);
+            row.residual.add_scaled(&row.direction_image, -length);
+            row.residual
+        };
+        part.turn_back(step, shared);
     }
 }
 
@@ -285,20 +467,21 @@ mod tests {
     use nalgebra::Vector6;
 
     #[test]
-    fn a_block_times_its_inverse_is_one() {
+    fn a_block_between_the_inverses_of_its_factor_is_one() {
         for (scale, seed) in [(1.0, 1.0), (1e-6, 2.0), (1e9, 3.0)] {
             let root = Matrix6::from_fn(|i, j| ((i * 5 + j * 3) as f64 * seed).sin());
             let matrix = (root * root.transpose() + Matrix6::identity()) * scale;
-            let inverse = Block::inverse_of(&matrix).unwrap();
+            let inverse = Block::inverse_factor_of(&matrix).unwrap();
+            let scaled = Block::of(&matrix).between(&inverse, &inverse, 1.0);
             for column in 0..BLOCK {
-                let mut unit = Vector6::zeros();
+                let mut unit = [0.0; BLOCK];
                 unit[column] = 1.0;
-                let product = inverse.product(&Column::of((matrix * unit).as_slice()));
-                assert!((Vector6::from_column_slice(&product.0[..BLOCK]) - unit).norm() < 1e-12);
+                let off = scaled.0[column].plus(&Column::of(&unit), -1.0);
+                assert!(off.0.iter().all(|off| off.abs() < 1e-12));
             }
         }
-        assert!(Block::inverse_of(&-Matrix6::identity()).is_none());
-        assert!(Block::inverse_of(&Matrix6::from_element(f64::NAN)).is_none());
+        assert!(Block::inverse_factor_of(&-Matrix6::identity()).is_none());
+        assert!(Block::inverse_factor_of(&Matrix6::from_element(f64::NAN)).is_none());
     }
 
     #[test]

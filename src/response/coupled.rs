@@ -386,20 +386,19 @@ impl Coupled {
             residual.copy_from_slice(sum.as_slice());
         };
         if !with_matrix {
-            team.each_row(residual, BLOCK, &mut vec![(); masses.len()], work_out);
+            team.each_row(residual, BLOCK, &mut vec![(); masses.len()], |row, residual, ()| work_out(row, residual));
             return;
         }
         diagonal.resize(masses.len(), Matrix6::zeros());
-        team.each_row(residual, BLOCK, diagonal, |row, residual| {
+        team.each_row(residual, BLOCK, diagonal, |row, residual, sum| {
             work_out(row, residual);
-            let mut sum = masses[row];
+            *sum = masses[row];
             for role in roles_of(row) {
                 let (part, member) = (&parts[role.part as usize], &members[role.member as usize]);
                 if part.resists {
-                    sum += member.block(&part.slope, member) * h;
+                    *sum += member.block(&part.slope, member) * h;
                 }
             }
-            sum
         });
         let couplings = &*couplings;
         let block = |index: usize| {

@@ -43,7 +43,7 @@ pub struct Step<'a> {
     /// Working memory.
     pub work: &'a mut Work,
     /// Who helps.
-    pub team: &'a Team,
+    pub team: &'a Team<'a>,
 }
 
 /// Working memory of a sub-step.

@@ -63,12 +63,17 @@ impl World {
 
     /// Bounds of a body over a step of `dt`. `None` when it has no coat.
     pub(super) fn bounds_of(&self, index: usize, motions: &[Motion], dt: f64) -> Option<Bounds> {
-        let mut bounds: Option<(Vec3, Vec3)> = None;
-        for (link, _, skeleton) in self.skeletons_of(&self.bodies[index]) {
-            let (low, high) = swept(&skeleton.desc.shape, skeleton.reach, &motions[link as usize], dt);
-            bounds = Some(bounds.map_or((low, high), |(l, h)| (l.inf(&low), h.sup(&high))));
+        let mut skeletons = self.skeletons_of(&self.bodies[index]);
+        let (link, _, Skeleton { desc, reach, .. }) = skeletons.next()?;
+        let motion = &motions[link as usize];
+        let (mut low, mut high) = swept(&desc.shape, *reach, motion, dt);
+        let (mut middle, mut radius) = swept_ball(&desc.shape, *reach, motion, dt);
+        for (link, _, skeleton) in skeletons {
+            let (l, h) = swept(&skeleton.desc.shape, skeleton.reach, &motions[link as usize], dt);
+            (low, high) = (l.inf(&low), h.sup(&high));
+            (middle, radius) = (Vec3::zeros(), f64::INFINITY);
         }
-        bounds.map(|(low, high)| Bounds { low, high, body: index as u32 })
+        Some(Bounds { low, high, middle, radius, body: index as u32 })
     }
 
     /// Fills a candidate with what of its bodies can matter within both their bounds. False when nothing can.
@@ -240,6 +245,19 @@ fn swept(shape: &Shape, margin: f64, motion: &Motion, dt: f64) -> (Vec3, Vec3) {
     let turned = if size.is_finite() { (motion.twist.angular.norm() * dt).min(2.0) * size } else { 0.0 };
     let any = Vec3::repeat(0.5 * motion.acceleration.norm() * dt * dt + turned);
     (low + path.inf(&Vec3::zeros()) - any, high + path.sup(&Vec3::zeros()) + any)
+}
+
+/// How far contacts may carry a body beyond its free path in a step, over its margin: without, contacts that begin within
+/// the step were found too late, and gained 6e-6 of the energy of ten hard balls.
+const ROOM: f64 = 0.1;
+
+/// Middle and radius of a ball around the same; a plane's has no end.
+fn swept_ball(shape: &Shape, margin: f64, motion: &Motion, dt: f64) -> (Vec3, f64) {
+    let middle = motion.pose().transform_point(&shape.middle());
+    let path = motion.twist.linear * dt;
+    let turned = (motion.twist.angular.norm() * dt).min(2.0) * (middle - motion.center).norm();
+    let any = 0.5 * (path.norm() + motion.acceleration.norm() * dt * dt) + turned;
+    (middle + path * 0.5, shape.half_extent() + (1.0 + ROOM) * margin + any)
 }
 
 /// Whether all of a region is farther than `reach` above a plane, which has no bounds that would tell.

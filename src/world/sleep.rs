@@ -102,6 +102,16 @@ impl World {
         *self.pair_filter.get_mut() = filter;
     }
 
+    /// Whether nobody is awake but what is fixed: nobody meets anybody.
+    pub(super) fn all_rest(&self, state: &Stepping) -> bool {
+        let fixed = |link: &u32| self.links[*link as usize].desc.kind == Kind::Fixed;
+        let rests = |slot: usize| {
+            let body = &self.bodies[slot];
+            body.is_asleep() || body.links.iter().all(fixed) && self.is_still(slot as u32, state)
+        };
+        self.bodies.indices().all(rests)
+    }
+
     /// Whether a body that is awake does not move, and has not been changed since the last step: who sleeps near it has
     /// its peace.
     pub(super) fn is_still(&self, body: u32, state: &Stepping) -> bool {

@@ -37,6 +37,8 @@ pub(crate) struct Stepping {
     /// Bounds of the last step, body by body, and the pairs that meet among them: while nobody moves, nobody else meets.
     pub(super) last_bounds: Vec<Bounds>,
     new_bounds: Vec<Bounds>,
+    /// Who slept when they were found, as a revision, and the length of that step.
+    bounded_for: (u64, f64),
     met: Vec<[u32; 2]>,
     meetings: Vec<Meeting>,
     /// In the order of their bodies.
@@ -149,6 +151,7 @@ impl Stepping {
             meetings: _,
             last_bounds: _,
             new_bounds: _,
+            bounded_for: _,
             met: _,
             previous: _,
             spare: _,
@@ -274,31 +277,29 @@ impl World {
 
     /// Pairs of bodies whose bounds meet and that may touch.
     fn find_candidates(&mut self, state: &mut Stepping, dt: f64, team: &Team) {
-        state.new_bounds.clear();
-        for index in self.bodies.indices() {
-            if self.bodies[index].enabled {
-                state.new_bounds.extend(self.bounds_of(index, &state.motions, dt));
-            }
-        }
+        self.find_bounds(state, dt);
         if state.new_bounds != state.last_bounds {
             state.bounds.clone_from(&state.new_bounds);
             broad_phase::pairs(&mut state.bounds, &mut state.met);
             std::mem::swap(&mut state.new_bounds, &mut state.last_bounds);
         }
-        state.pairs.clone_from(&state.met);
-        state.bounds_of.clear();
-        state.bounds_of.resize(self.bodies.capacity(), usize::MAX);
-        for (position, bounds) in state.bounds.iter().enumerate() {
-            state.bounds_of[bounds.body as usize] = position;
+        state.pairs.clear();
+        if !self.all_rest(state) {
+            state.pairs.extend_from_slice(&state.met);
+            state.bounds_of.clear();
+            state.bounds_of.resize(self.bodies.capacity(), usize::MAX);
+            for (position, bounds) in state.bounds.iter().enumerate() {
+                state.bounds_of[bounds.body as usize] = position;
+            }
+            self.wake_touched(state, dt);
+            let mut filter = self.pair_filter.get_mut().take();
+            state.pairs.retain(|pair| {
+                let asleep = pair.iter().any(|body| self.bodies[*body as usize].is_asleep());
+                !asleep && self.may_touch(pair, &state.motions, &mut filter)
+            });
+            *self.pair_filter.get_mut() = filter;
         }
-        self.wake_touched(state, dt);
         std::mem::swap(&mut state.candidates, &mut state.previous);
-        let mut filter = self.pair_filter.get_mut().take();
-        state.pairs.retain(|pair| {
-            let asleep = pair.iter().any(|body| self.bodies[*body as usize].is_asleep());
-            !asleep && self.may_touch(pair, &state.motions, &mut filter)
-        });
-        *self.pair_filter.get_mut() = filter;
         self.list_meetings(state);
         let mut old = 0;
         for Meeting { bodies, part, block } in &state.meetings {
@@ -334,6 +335,25 @@ impl World {
         // What no skeleton is close enough for goes back to where it came from.
         for candidate in state.candidates.extract_if(.., |candidate| !candidate.close) {
             state.previous.push(candidate);
+        }
+    }
+
+    /// Bounds of all bodies, in their order; of one asleep, those of the last step.
+    fn find_bounds(&self, state: &mut Stepping, dt: f64) {
+        let now = (state.rest_revision, dt);
+        let slept = if state.bounded_for == now { &state.last_bounds[..] } else { &[] };
+        state.bounded_for = now;
+        let mut slept = slept.iter().peekable();
+        state.new_bounds.clear();
+        for index in self.bodies.indices() {
+            let body = &self.bodies[index];
+            while slept.next_if(|bounds| bounds.body < index as u32).is_some() {}
+            let last = slept.next_if(|bounds| bounds.body == index as u32);
+            match last.filter(|_| body.is_asleep()) {
+                _ if !body.enabled => {}
+                Some(last) => state.new_bounds.push(*last),
+                None => state.new_bounds.extend(self.bounds_of(index, &state.motions, dt)),
+            }
         }
     }
 
