@@ -9,7 +9,7 @@ use common::{Coat, DT, G, ball_inertia, box_inertia};
 use isocoat::base::Kind;
 use isocoat::field::Shape;
 use isocoat::math::{Pose, Twist, Vec3};
-use isocoat::world::{BodyDesc, BodyId, Contact, LinkDesc, LinkId, LinkState, Response, World, WorldDesc};
+use isocoat::world::{BodyDesc, BodyId, Contact, EventKind, LinkDesc, LinkId, LinkState, Response, World, WorldDesc};
 
 const RADIUS: f64 = 0.1;
 
@@ -54,6 +54,18 @@ fn one_asleep() -> (World, (BodyId, LinkId), (BodyId, LinkId)) {
     let ball = add_ball(&mut world, 0.5, Vec3::new(0.0, 0.0, RADIUS - 0.001));
     fall_asleep(&mut world, 1, 300);
     (world, floor, ball)
+}
+
+/// Nobody is awake but the floor then, and still the world says that they parted.
+#[test]
+fn the_contact_of_a_sleeper_that_is_destroyed_ends() {
+    let (mut world, floor, ball) = one_asleep();
+    world.destroy_body(ball.0).unwrap();
+    world.step(DT).unwrap();
+    let ends: Vec<_> = world.events().iter().filter(|event| event.kind == EventKind::End).collect();
+    assert_eq!(ends.len(), 1);
+    assert_eq!(ends[0].bodies, [floor.0, ball.0]);
+    assert!(world.contacts().is_empty());
 }
 
 /// Balls in rows on a floor between walls, touching each other, and more of them on top.

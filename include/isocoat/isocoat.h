@@ -1806,7 +1806,7 @@ typedef struct isocoat_counters {
     uint32_t substeps;
     /** Pieces of contact surface at the end of the step. */
     uint32_t patches;
-    /** Evaluations of a pair of fields. */
+    /** Evaluations of a pair of fields. Contacts at rest need none: their surfaces stand from the last step. */
     uint64_t evaluations;
     /** Rounds of the implicitly solved group that took the most, with those of all parts of a split step. */
     uint32_t implicit_rounds;

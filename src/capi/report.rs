@@ -171,7 +171,7 @@ pub struct isocoat_counters {
     pub substeps: u32,
     /// Pieces of contact surface at the end of the step.
     pub patches: u32,
-    /// Evaluations of a pair of fields.
+    /// Evaluations of a pair of fields. Contacts at rest need none: their surfaces stand from the last step.
     pub evaluations: u64,
     /// Rounds of the implicitly solved group that took the most, with those of all parts of a split step.
     pub implicit_rounds: u32,

@@ -4,16 +4,18 @@
 //! While two bodies hardly move against each other from one sub-step to the next, their contact surface is not
 //! integrated anew: each node's pressure follows the motion by its stiffness, `p + g n·Δ`. The force is then off by the
 //! square of the motion over the depth, so the motion that is allowed goes with the root of the tolerance. A step always
-//! begins with a fresh surface, so that nothing but the poses decides.
+//! begins with a fresh surface, so that nothing but the poses decides; an implicit one with a surface that
+//! [stands](super::standing), if there is one.
 
 use super::friction::Bristle;
 use super::pair::Pair;
 use super::patch::{Node, Sums};
 use super::press::Material;
+use super::standing::{self, Standing};
 use super::surface::{Settings, Surface, integrate};
 use crate::base::Motion;
 use crate::handle::RawId;
-use crate::math::{Quat, Vec3, rotation_to_vector};
+use crate::math::{Quat, Twist, Vec3, rotation_to_vector};
 
 /// Motion of the nodes over the depth of the contact, over the root of the tolerance, up to which the surface is kept.
 const KEEP: f64 = 0.1;
@@ -41,6 +43,8 @@ pub struct Candidate {
     pub close: bool,
     /// The surface was integrated by the last look, not kept.
     pub fresh: bool,
+    /// The surface is the one of which [`Memory::standing`] tells.
+    standing: bool,
     /// What each of its patches came to.
     pub loads: Vec<Sums>,
     /// What lasts from step to step.
@@ -80,6 +84,7 @@ impl Candidate {
             nodes: _,
             reference: _,
             fresh: _,
+            standing: _,
             loads: _,
             memory,
         } = self;
@@ -91,6 +96,56 @@ impl Candidate {
         (self.bodies, self.memory.part)
     }
 
+    /// Remembers what came from elsewhere: the surface is of something else.
+    pub fn recall(&mut self, memory: Memory) {
+        self.bodies = memory.ids.map(|id| id.index);
+        self.memory = memory;
+        self.standing = false;
+    }
+
+    /// The contact surface for a round of an implicit step, at the poses where the round begins; in the `first` the one
+    /// of the last step, if it stands.
+    pub fn look_in_round(&mut self, motions: &[Motion], settings: &Settings, first: bool) {
+        let likeness = standing::likeness(&self.pair, self.lead, settings, motions);
+        self.fresh = !(first && self.stands(motions, settings, likeness));
+        if !self.fresh {
+            self.memory.standing.put_forward(&mut self.pair, motions);
+            return;
+        }
+        self.pair.place(motions, self.lead);
+        self.integrate(settings);
+        self.memory.standing.forget();
+        // What has no depth says nothing of how far it may move.
+        self.standing = self.surface.is_sound();
+        if self.standing {
+            self.memory.standing.set(&self.pair, self.lead, likeness, motions);
+        }
+    }
+
+    /// Whether the surface of the last step stands. If it is no longer there, it is made again where it was.
+    fn stands(&mut self, motions: &[Motion], settings: &Settings, likeness: u64) -> bool {
+        let standing = &self.memory.standing;
+        if standing.likeness != likeness || standing.places.first().is_none_or(|place| place.link != self.lead) {
+            return false;
+        }
+        if !self.standing {
+            standing.put_back(&mut self.pair, motions);
+            self.integrate(settings);
+            self.standing = true;
+        }
+        self.memory.standing.stands(&self.pair, &self.surface, motions)
+    }
+
+    /// The velocity that in `h` seconds would take a link to where a surface that stands was evaluated.
+    pub fn velocity_looked_at(&self, link: u32, motions: &[Motion], h: f64) -> Twist {
+        self.memory.standing.velocity(link, &motions[link as usize], h)
+    }
+
+    fn integrate(&mut self, settings: &Settings) {
+        integrate(&self.pair, settings, &mut self.surface);
+        self.nodes.clone_from(&self.surface.nodes);
+    }
+
     /// Brings the contact surface up to the present poses, by a fresh integration when `fresh` or when the bodies have
     /// moved too far against each other.
     pub fn look(&mut self, motions: &[Motion], settings: &Settings, fresh: bool) {
@@ -99,8 +154,8 @@ impl Candidate {
             return;
         }
         self.pair.place(motions, self.lead);
-        integrate(&self.pair, settings, &mut self.surface);
-        self.nodes.clone_from(&self.surface.nodes);
+        self.integrate(settings);
+        self.memory.standing.forget();
         self.reference = self.placements(motions);
     }
 
@@ -174,6 +229,8 @@ pub struct Memory {
     pub rate2: f64,
     /// One a sticking patch.
     pub bristles: Vec<Bristle>,
+    /// Of the surface that the last implicit step ended with.
+    pub standing: Standing,
 }
 
 impl Memory {
@@ -186,12 +243,13 @@ impl Memory {
     pub fn forget_history(&mut self) {
         self.rate2 = 0.0;
         self.bristles.clear();
+        self.standing.forget();
     }
 
-    /// Forgets all but the room for bristles.
+    /// Forgets all but the room for bristles and places.
     pub fn forget(&mut self) {
-        let mut bristles = std::mem::take(&mut self.bristles);
-        bristles.clear();
-        *self = Memory { bristles, ..Memory::default() };
+        self.forget_history();
+        let (bristles, standing) = (std::mem::take(&mut self.bristles), std::mem::take(&mut self.standing));
+        *self = Memory { bristles, standing, ..Memory::default() };
     }
 }

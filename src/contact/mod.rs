@@ -17,6 +17,7 @@ pub mod patch;
 pub mod polar;
 pub mod press;
 pub mod seeds;
+pub mod standing;
 pub mod stiffness;
 pub mod surface;
 pub mod tally;

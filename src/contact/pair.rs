@@ -14,7 +14,7 @@
 use crate::base::Motion;
 use crate::coat::seeds::Ray;
 use crate::field::{Graph, Placed, Shape, blend};
-use crate::math::{Mat3, Pose, Vec3};
+use crate::math::{Mat3, Pose, Quat, Vec3};
 use std::sync::Arc;
 
 /// Ratio of stiffness beyond which the stiffer of two deformable bodies counts as rigid.
@@ -119,8 +119,12 @@ impl Side {
 
     /// Puts the skeletons where their links are, in a frame at `origin` with the world's axes.
     pub fn place(&mut self, motions: &[Motion], origin: &Vec3) {
+        self.place_by(|link| local_pose(&motions[link as usize], origin));
+    }
+
+    fn place_by(&mut self, pose_of: impl Fn(u32) -> Pose) {
         for (index, link) in self.links.iter().enumerate() {
-            let pose = local_pose(&motions[*link as usize], origin);
+            let pose = pose_of(*link);
             self.poses[index] = pose;
             self.skeletons[index].shape = self.locals[index].transformed(&pose);
         }
@@ -161,11 +165,13 @@ impl Side {
 
 /// The pose of a link in a frame at `origin` with the world's axes.
 fn local_pose(motion: &Motion, origin: &Vec3) -> Pose {
-    Pose {
-        // The difference of the centres is exact where the sum of pose and origin would not be.
-        position: (motion.center - origin) - motion.rotation * motion.local_center,
-        rotation: motion.rotation,
-    }
+    pose_about(origin, &motion.center, motion.rotation, &motion.local_center)
+}
+
+/// The pose of a link in a frame about `origin`, from where its centre of mass is.
+pub fn pose_about(origin: &Vec3, center: &Vec3, rotation: Quat, local_center: &Vec3) -> Pose {
+    // The difference of the centres is exact where the sum of pose and origin would not be.
+    Pose { position: (center - origin) - rotation * local_center, rotation }
 }
 
 /// A skeleton that blends with both sides of a pair, which are parts of one body.
@@ -258,11 +264,17 @@ impl Pair {
 
     /// Puts all skeletons where their links are; the frame's origin goes to the centre of mass of link `lead`.
     pub fn place(&mut self, motions: &[Motion], lead: u32) {
-        self.origin = motions[lead as usize].center;
-        self.a.place(motions, &self.origin);
-        self.b.place(motions, &self.origin);
+        let origin = motions[lead as usize].center;
+        self.place_by(&origin, |link| local_pose(&motions[link as usize], &origin));
+    }
+
+    /// Puts all skeletons where links have these poses in a frame about `origin`.
+    pub fn place_by(&mut self, origin: &Vec3, pose_of: impl Fn(u32) -> Pose) {
+        self.origin = *origin;
+        self.a.place_by(&pose_of);
+        self.b.place_by(&pose_of);
         for cover in &mut self.covers {
-            let pose = local_pose(&motions[cover.link as usize], &self.origin);
+            let pose = pose_of(cover.link);
             cover.skeleton.shape = cover.local.transformed(&pose);
         }
     }

@@ -51,6 +51,13 @@ pub struct Surface {
     pieces: facets::Workspace,
 }
 
+impl Surface {
+    /// Whether it has patches, and nothing is pressed past what it can carry.
+    pub fn is_sound(&self) -> bool {
+        !self.patches.is_empty() && self.overloads.is_empty()
+    }
+}
+
 /// A region of the surface that a patch already accounts for.
 #[derive(Clone, Copy, Debug)]
 enum Covered {
@@ -321,7 +328,7 @@ fn patch(pair: &Pair, settings: &Settings, at: &Deepest, extent: f64, out: &mut 
 }
 
 /// Size of a coat's finite skeletons, grown by their reach \[m\].
-fn extent(side: &Side) -> f64 {
+pub(super) fn extent(side: &Side) -> f64 {
     let mut bounds: Option<(Vec3, Vec3)> = None;
     for (skeleton, reach) in side.skeletons.iter().zip(&side.reach) {
         if matches!(skeleton.shape, Shape::Plane { .. }) {

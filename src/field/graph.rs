@@ -95,6 +95,25 @@ impl Graph {
         Self { band, ..Self::default() }
     }
 
+    /// All that makes it, number by number.
+    pub fn each_number(&self, mut number: impl FnMut(u64)) {
+        let Self { band, levels, starts, cliques, labels, bonds } = self;
+        // Without levels, it is of an earlier use.
+        number(if levels.is_empty() { 0 } else { band.to_bits() });
+        for Level { share, count } in levels {
+            number(share.to_bits());
+            number(u64::from(*count));
+        }
+        for list in [starts, cliques, labels] {
+            number(list.len() as u64);
+            list.iter().for_each(|entry| number(u64::from(*entry)));
+        }
+        for ([a, b], weight) in bonds {
+            number(u64::from(*a) << 32 | u64::from(*b));
+            number(weight.to_bits());
+        }
+    }
+
     /// Whether all skeletons add up.
     pub fn is_complete(&self) -> bool {
         self.levels.is_empty() && self.labels.is_empty()

@@ -226,6 +226,7 @@ impl Blocks {
         let row = matrix.ends.len();
         let chunk = row / CHUNK * CHUNK;
         let range = matrix.sources.len()..others.len();
+        debug_assert!(others[range.clone()].iter().all(|other| *other as usize != row), "row {row} with itself");
         let is_near = |other: u32| (chunk..chunk + CHUNK).contains(&(other as usize));
         let ends = [Class::Lower, Class::Upper, Class::Far].map(|class| {
             for source in range.clone() {
@@ -289,14 +290,15 @@ impl Blocks {
                 *sums = dispatch.run(Images { part: Part { matrix, first: chunk * CHUNK, rows }, shared: all });
             });
             let size = sums.iter().map(|sums| sums.size).sum::<f64>();
-            if size.is_nan() {
-                return false;
-            }
             if iteration == 0 {
                 first_size = size;
             }
             let turn = size / last_size;
             let bend = sums.iter().map(|sums| sums.bend).sum::<f64>() - turn * size / length;
+            // Not positive definite.
+            if size.is_nan() || iteration == 0 && size > 0.0 && bend <= 0.0 {
+                return false;
+            }
             if size <= tolerance * tolerance * first_size || bend <= 0.0 || iteration == most {
                 break;
             }

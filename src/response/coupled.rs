@@ -8,7 +8,7 @@ use nalgebra::{Matrix6, Vector6};
 
 use super::conjugate::{Block, Blocks};
 use super::envelope::{BLOCK, Envelope};
-use super::group::{Group, Member, Points, Push, Slope};
+use super::group::{Group, Member, Points, Push, Slope, relative};
 use super::grouping::Bundle;
 use super::springs::Tie;
 use crate::base::{Inertia, Motion};
@@ -144,29 +144,21 @@ impl Coupled {
         self.members.extend_from_slice(&bundle.members);
     }
 
-    /// Sets the velocities at which the contact surfaces were evaluated.
+    /// Sets the velocities at which the contact surfaces were evaluated in this round.
     pub fn set_base(&mut self, x: &[f64], fixed: &[Motion], team: &Team) {
         let mut groups = std::mem::take(&mut self.groups);
         let block = team.share(groups.len(), GROUPS);
-        team.each_mut(&mut groups, block, |_, group| group.base = self.relative_of(group.members, x, fixed));
+        team.each_mut(&mut groups, block, |_, group| {
+            if !group.looked {
+                group.base = self.relative_of(group.members, x, fixed);
+            }
+        });
         self.groups = groups;
-    }
-
-    /// Velocity of b relative to a over the members of a group, about its centre, or of a tie, for velocities `of` the
-    /// links.
-    pub fn relative(&self, members: (usize, usize), of: impl Fn(u32) -> Twist) -> Twist {
-        let mut sum = Twist::default();
-        for member in &self.members[members.0..members.1] {
-            let twist = member.twist(&of(member.link));
-            sum.linear += twist.linear * member.weight;
-            sum.angular += twist.angular * member.weight;
-        }
-        sum
     }
 
     /// The relative velocity over some members for the unknowns `x`; `fixed` has the velocities of links without unknowns.
     pub fn relative_of(&self, members: (usize, usize), x: &[f64], fixed: &[Motion]) -> Twist {
-        self.relative(members, |link| match self.blocks[link as usize] {
+        relative(&self.members[members.0..members.1], |link| match self.blocks[link as usize] {
             NONE => fixed[link as usize].twist,
             block => twist_of(x, block),
         })

@@ -175,6 +175,17 @@ impl Member {
     }
 }
 
+/// Velocity of b relative to a over the members of a group, about its centre, or of a tie, for velocities `of` the links.
+pub fn relative(members: &[Member], of: impl Fn(u32) -> Twist) -> Twist {
+    let mut sum = Twist::default();
+    for member in members {
+        let twist = member.twist(&of(member.link));
+        sum.linear += twist.linear * member.weight;
+        sum.angular += twist.angular * member.weight;
+    }
+    sum
+}
+
 /// `[arm] matrix`: the cross product with each column.
 fn cross_times(arm: &Vec3, matrix: &Mat3) -> Mat3 {
     Mat3::from_columns(&[0, 1, 2].map(|column| arm.cross(&matrix.column(column))))
@@ -229,6 +240,8 @@ pub struct Group {
     pub material: Material,
     /// How it rubs.
     pub grip: Grip,
+    /// Its surface was evaluated before this step: the base is known.
+    pub looked: bool,
     /// Relative velocity at the evaluation.
     pub base: Twist,
 }
@@ -476,6 +489,7 @@ mod tests {
             members: (0, 0),
             material: Material { dissipation: 0.4, viscous: 3.0, ..Material::default() },
             grip: Grip { coefficient: friction, creep: 0.01, ..Grip::default() },
+            looked: false,
             base: Twist { linear: Vec3::new(0.0, 0.01, 0.02), angular: Vec3::new(0.3, 0.0, 0.1) },
         };
         (group, points)

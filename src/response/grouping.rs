@@ -1,7 +1,7 @@
 //! From contact surfaces to groups: what each candidate brings into the system of an
 //! [implicit step](super::implicit), as points that press and rub on the links that carry them.
 
-use super::group::{Grip, Group, Member, Point, Points};
+use super::group::{Grip, Group, Member, Point, Points, relative};
 use super::sharing::Sharing;
 use super::substep::PUSH_OUT;
 use crate::base::{Inertia, Motion};
@@ -48,7 +48,9 @@ impl Bundle {
 pub struct Grouping<'a> {
     /// Where they are put.
     pub bundle: &'a mut Bundle,
-    /// The links where the surface was evaluated.
+    /// The links where the step begins.
+    pub motions: &'a [Motion],
+    /// The links where the round begins.
     pub trial: &'a [Motion],
     /// The candidate.
     pub candidate: &'a Candidate,
@@ -103,13 +105,17 @@ impl Grouping<'_> {
 
     /// Adds the groups of a patch.
     fn add_patch(&mut self, number: usize, nodes: &[Node], sums: &Sums, grip: &Grip) {
-        let Self { bundle, trial, candidate: Candidate { pair, material, .. }, index, .. } = self;
+        let Self { bundle, motions, trial, candidate, index, h, .. } = self;
+        let Candidate { pair, material, .. } = candidate;
         let Bundle { groups, points, members, sharing, .. } = &mut **bundle;
         sharing.find(pair, nodes);
         sharing.each_kind(nodes, |nodes, shares| {
             let (first_point, first_member) = (points.count(), members.len());
             let center = points.extend(nodes);
             members.extend(shares.iter().map(|share| member(trial, pair, &center, *share)));
+            let own = &members[first_member..];
+            let base =
+                (!candidate.fresh).then(|| relative(own, |link| candidate.velocity_looked_at(link, motions, *h)));
             groups.push(Group {
                 candidate: *index,
                 patch: Some(number as u32),
@@ -118,7 +124,8 @@ impl Grouping<'_> {
                 members: (first_member, members.len()),
                 material: *material,
                 grip: Grip { slip: grip.slip + grip.spin.cross(&(center - sums.center)), ..*grip },
-                base: Twist::default(),
+                looked: base.is_some(),
+                base: base.unwrap_or_default(),
             });
         });
     }
@@ -191,6 +198,7 @@ impl Grouping<'_> {
             members: (first_member, members.len()),
             material: Material::default(),
             grip: Grip::default(),
+            looked: false,
             base: Twist::default(),
         });
     }

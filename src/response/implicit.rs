@@ -220,9 +220,9 @@ impl Solver {
         self.reach = RUSH * h * self.change(&self.free);
         let nobody_near = step.island.candidates.is_empty();
         let mut converged = false;
-        for _ in 0..effort.rounds {
+        for round in 0..effort.rounds {
             self.rounds += 1;
-            self.look(step, h);
+            self.look(step, h, round == 0);
             clock.lap(&mut step.work.contact_time);
             self.couple_all(step, h, false);
             let solved =
@@ -243,7 +243,7 @@ impl Solver {
             }
             // One solve with the surfaces as they are now: what moves on is small in so short a step, and no gap closes.
             self.x.fill(0.0);
-            self.look(step, h);
+            self.look(step, h, false);
             clock.lap(&mut step.work.contact_time);
             self.couple_all(step, h, true);
             self.coupled.solve(&mut self.x, &self.free, step.motions, h, ACCURACY * effort.tolerance, step.team);
@@ -338,8 +338,8 @@ impl Solver {
         (0..self.order.len()).map(size).fold(0.0, f64::max)
     }
 
-    /// Evaluates the contacts where the velocities lead.
-    fn look(&mut self, step: &mut Step, h: f64) {
+    /// Evaluates the contacts where the velocities lead; in the `first` round, those that do not stand.
+    fn look(&mut self, step: &mut Step, h: f64, first: bool) {
         self.looked.clone_from(&self.x);
         let Step { motions, island, candidates, settings, work, team } = step;
         for link in &island.links {
@@ -349,7 +349,8 @@ impl Solver {
             self.trial[*link as usize].twist = twist_of(&self.x, block as u32);
         }
         drift(&mut self.trial, island, h);
-        work.look(&self.trial, island, candidates, settings, true, team);
+        let trial = &self.trial;
+        work.look(island, candidates, team, |candidate| candidate.look_in_round(trial, settings, first));
     }
 
     /// Puts contact surfaces and springs into the system; as a `last_resort`, the surfaces frozen where they are.
@@ -363,7 +364,7 @@ impl Solver {
             bundle.clear();
             for index in island.candidates.iter().skip(number * TOGETHER).take(TOGETHER) {
                 let (candidate, index) = (&candidates[*index as usize], *index);
-                Grouping { bundle: &mut *bundle, trial, candidate, index, h, reach, last_resort }.add_all();
+                Grouping { bundle: &mut *bundle, motions, trial, candidate, index, h, reach, last_resort }.add_all();
             }
         });
         for bundle in &self.bundles[..count] {
@@ -394,7 +395,8 @@ impl Solver {
             let depth = patch.peak_pressure / pair.pair.scale / patch.slope;
             let size = self.size(group).max(depth);
             let moved = change.linear.norm() + change.angular.norm() * size;
-            if moved <= NEGLIGIBLE * speed {
+            // In each step anew, what is negligible in one would add up.
+            if !group.looked && moved <= NEGLIGIBLE * speed {
                 return true;
             }
             let along = change.linear - patch.normal * change.linear.dot(&patch.normal);

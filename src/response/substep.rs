@@ -63,17 +63,15 @@ pub struct Work {
 }
 
 impl Work {
-    /// Brings the contact surfaces of an island up to the present poses.
+    /// Brings the contact surfaces of an island up to the present poses, each by `look`.
     pub fn look(
         &mut self,
-        motions: &[Motion],
         island: &Island,
         candidates: &mut [Kept],
-        settings: &Settings,
-        fresh: bool,
         team: &Team,
+        look: impl Fn(&mut Candidate) + Sync,
     ) {
-        team.each_at(candidates, &island.candidates, BLOCK, |candidate| candidate.look(motions, settings, fresh));
+        team.each_at(candidates, &island.candidates, BLOCK, |candidate| look(candidate));
         for index in &island.candidates {
             let candidate = &candidates[*index as usize];
             if candidate.fresh {
@@ -90,7 +88,8 @@ impl Step<'_> {
         let Self { motions, island, candidates, settings, work, team } = self;
         drift(motions, island, before * h);
         let mut clock = Clock::start(work.timed);
-        work.look(motions, island, candidates, settings, fresh, team);
+        let motions = &mut **motions;
+        work.look(island, candidates, team, |candidate| candidate.look(motions, settings, fresh));
         clock.lap(&mut work.contact_time);
         for index in &island.candidates {
             let candidate = &mut candidates[*index as usize];

@@ -7,6 +7,7 @@ use super::{Contact, Link, LinkId, Skeleton, SkeletonId, World, desc};
 use crate::coat::volume::OFFSETS;
 use crate::contact::candidate::Memory;
 use crate::contact::friction::Bristle;
+use crate::contact::standing::Place;
 use crate::error::{Error, Result, require, require_finite};
 use crate::handle::{Arena, Noun};
 use crate::math::Pose;
@@ -92,8 +93,18 @@ impl World {
     pub(super) fn check_memories(&self, memories: &[Memory]) -> Result<()> {
         let (_, _, given) = self.bodies.parts();
         let mut last = None;
-        for Memory { ids, part, touching: _, touched: _, overloaded: _, was_overloaded: _, rate2, bristles } in memories
-        {
+        for memory in memories {
+            let Memory {
+                ids,
+                part,
+                touching: _,
+                touched: _,
+                overloaded: _,
+                was_overloaded: _,
+                rate2,
+                bristles,
+                standing,
+            } = memory;
             let pair = ids.map(|id| id.index);
             let refuse = |why: &str| Err(Error::Snapshot(format!("pair of bodies {} and {}: {why}", pair[0], pair[1])));
             if ids
@@ -119,6 +130,14 @@ impl World {
                 }
                 if !crate::math::is_finite(slip) || !turn.is_finite() {
                     return refuse("the bend of a bristle is not finite");
+                }
+            }
+            for Place { link, center, rotation } in &standing.places {
+                if *link as usize >= self.links.capacity() {
+                    return refuse("a surface of links that have never been");
+                }
+                if !crate::math::is_finite(center) || (rotation.coords.norm() - 1.0).abs() > 1e-6 {
+                    return refuse("the place of a link that it was evaluated at is none");
                 }
             }
         }

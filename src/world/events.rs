@@ -80,7 +80,8 @@ pub struct Counters {
     pub implicit_splits: u32,
     /// Patches at the end of the step.
     pub patches: u32,
-    /// Evaluations of a pair of fields, by all schemes.
+    /// Evaluations of a pair of fields, by all schemes. Contacts at rest need none: their surfaces stand from the last
+    /// step.
     pub evaluations: u64,
     /// What each scheme did, in all rounds and sub-steps.
     pub by_scheme: Tally,

@@ -91,9 +91,10 @@ impl World {
         candidate.pair.covers.clear();
         candidate.pair.prepare();
         candidate.material = material(a, b);
-        // The smaller body's link leads: its coordinates near the contact are the smallest.
+        // The smaller body's link leads: its coordinates near the contact are the smallest. Of those alike always the
+        // same one, so that their surface may stand.
         let size = |bounds: &Bounds| (bounds.high - bounds.low).norm();
-        let smaller = if size(bounds[0]) <= size(bounds[1]) { &candidate.pair.a } else { &candidate.pair.b };
+        let smaller = if size(bounds[0]) <= 1.01 * size(bounds[1]) { &candidate.pair.a } else { &candidate.pair.b };
         candidate.lead = smaller.links[0];
         true
     }

@@ -65,7 +65,6 @@ impl World {
         if self.desc.sleep_time <= 0.0 && state.resting.is_empty() {
             return;
         }
-        self.take_up_memories(state);
         let mut filter = self.pair_filter.get_mut().take();
         let pairs = std::mem::take(&mut state.pairs);
         loop {
@@ -107,7 +106,9 @@ impl World {
         let fixed = |link: &u32| self.links[*link as usize].desc.kind == Kind::Fixed;
         let rests = |slot: usize| {
             let body = &self.bodies[slot];
-            body.is_asleep() || body.links.iter().all(fixed) && self.is_still(slot as u32, state)
+            // Substances have no links.
+            let still = body.substance.is_none() && body.links.iter().all(fixed) && self.is_still(slot as u32, state);
+            body.is_asleep() || still
         };
         self.bodies.indices().all(rests)
     }
@@ -124,13 +125,12 @@ impl World {
     }
 
     /// Pairs of which nobody sleeps any more go on as candidates of the last step.
-    fn take_up_memories(&self, state: &mut Stepping) {
+    pub(super) fn take_up_memories(&self, state: &mut Stepping) {
         let before = state.candidates.len();
         let rests = |memory: &mut Memory| memory.ids.iter().any(|id| is_asleep(&self.bodies, id.index));
         for memory in state.resting.extract_if(.., |memory| !rests(memory)) {
             let mut candidate = state.spare.pop().unwrap_or_default();
-            candidate.bodies = memory.ids.map(|id| id.index);
-            candidate.memory = memory;
+            candidate.recall(memory);
             state.candidates.push(candidate);
         }
         if state.candidates.len() > before {

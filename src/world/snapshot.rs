@@ -27,6 +27,7 @@ use crate::base::Kind;
 use crate::contact::Scheme;
 use crate::contact::candidate::Memory;
 use crate::contact::friction::Bristle;
+use crate::contact::standing::{Place, Standing};
 use crate::error::{Error, Result};
 use crate::field::{Graph, Profile, Shape};
 use crate::handle::{Arena, Id, Noun, RawId, Slot, WorldTag};
@@ -37,7 +38,7 @@ use crate::substance::{Bond, Particle, ParticleId, ParticleSlot, Substance, Subs
 use crate::team::Alone;
 
 /// What the lists below say. Another number is refused: no snapshot is ever half understood.
-const FORMAT: u32 = 5;
+const FORMAT: u32 = 6;
 const MAGIC: [u8; 8] = *b"isocoat\0";
 /// Offsets of the parts of the header.
 const FORMAT_AT: usize = 8;
@@ -104,7 +105,9 @@ structs! {
     Mirror {
         active, twist, expected_center, expected_rotation, expected_twist, commanded, owed, estimate, bypassed, doubt,
     }
-    Memory { ids, part, touching, touched, overloaded, was_overloaded, rate2, bristles }
+    Memory { ids, part, touching, touched, overloaded, was_overloaded, rate2, bristles, standing }
+    Standing { likeness, places }
+    Place { link, center, rotation }
     Bristle { key, slip, turn, sliding, seen }
     Contact {
         bodies, links, skeletons, position, normal, force, torque, area, peak_pressure, stiffness, error_estimate,

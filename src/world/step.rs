@@ -182,8 +182,7 @@ impl Stepping {
         }
         self.spare.extend(self.candidates.drain(memories.len()..));
         for (candidate, memory) in self.candidates.iter_mut().zip(memories) {
-            candidate.bodies = memory.ids.map(|id| id.index);
-            candidate.memory = memory;
+            candidate.recall(memory);
         }
         (self.resting, self.settled) = (resting, false);
         (self.resting_contacts, self.contacts) = (contacts.len(), contacts);
@@ -284,6 +283,7 @@ impl World {
             std::mem::swap(&mut state.new_bounds, &mut state.last_bounds);
         }
         state.pairs.clear();
+        self.take_up_memories(state);
         if !self.all_rest(state) {
             state.pairs.extend_from_slice(&state.met);
             state.bounds_of.clear();
