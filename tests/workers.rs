@@ -287,7 +287,7 @@ fn settled(mut world: World, steps: usize) -> World {
 fn two_workers_are_nearly_twice_as_fast_on_125_bodies() {
     let mut slow = Vec::new();
     let scenes: [Scene; 3] = [
-        ("125 balls at rest in a heap", || settled(heap(5), 120), 100),
+        ("125 balls at rest in a heap", || settled(heap(5), 300), 100),
         ("125 balls that bounce", || bouncing(125), 100),
         ("120 cubes at rest in a wall", || settled(wall(15), 60), 60),
     ];
