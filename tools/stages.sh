@@ -41,3 +41,5 @@ for stage in "$@"; do
 done
 took=$(($(date +%s) - start))
 printf '\nAll %d stages passed in %d min %02d s.\n' $# $((took / 60)) $((took % 60))
+# For those who count.
+printf 'stages: %d passed, 0 failed\n' $#

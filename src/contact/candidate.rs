@@ -109,7 +109,6 @@ impl Candidate {
         let likeness = standing::likeness(&self.pair, self.lead, settings, motions);
         self.fresh = !(first && self.stands(motions, settings, likeness));
         if !self.fresh {
-            self.memory.standing.put_forward(&mut self.pair, motions);
             return;
         }
         self.pair.place(motions, self.lead);
@@ -122,7 +121,8 @@ impl Candidate {
         }
     }
 
-    /// Whether the surface of the last step stands. If it is no longer there, it is made again where it was.
+    /// Whether the surface of the last step stands; the pair is placed in its frame then. If it is no longer there, it is
+    /// made again where it was.
     fn stands(&mut self, motions: &[Motion], settings: &Settings, likeness: u64) -> bool {
         let standing = &self.memory.standing;
         if standing.likeness != likeness || standing.places.first().is_none_or(|place| place.link != self.lead) {
@@ -133,6 +133,7 @@ impl Candidate {
             self.integrate(settings);
             self.standing = true;
         }
+        self.memory.standing.put_forward(&mut self.pair, motions);
         self.memory.standing.stands(&self.pair, &self.surface, motions)
     }
 
