@@ -7,7 +7,7 @@
 // on how it comes to lie, and that on the push, 34 N s by default. Its joints are Bullet's, solved apart from the
 // contacts, and with many limbs touching, each one's load through them is an estimate: so limbs that friction holds just
 // so slip now and then. Of the pushes from 33 to 45, six (34, 35, 41, 42, 44, 45) leave it within 1 mm and below 1 mm/s
-// in the last 20 s; with 38 a limb goes on sliding, by 11 mm.
+// in the last 20 s; with 38 a limb goes on sliding, by 10 mm.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
