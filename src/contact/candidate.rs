@@ -133,7 +133,7 @@ impl Candidate {
             self.integrate(settings);
             self.standing = true;
         }
-        self.memory.standing.put_forward(&mut self.pair, motions);
+        self.pair.place_about(motions, &self.memory.standing.places[0].center);
         self.memory.standing.stands(&self.pair, &self.surface, motions)
     }
 

@@ -264,8 +264,12 @@ impl Pair {
 
     /// Puts all skeletons where their links are; the frame's origin goes to the centre of mass of link `lead`.
     pub fn place(&mut self, motions: &[Motion], lead: u32) {
-        let origin = motions[lead as usize].center;
-        self.place_by(&origin, |link| local_pose(&motions[link as usize], &origin));
+        self.place_about(motions, &motions[lead as usize].center);
+    }
+
+    /// The same with the frame's origin anywhere.
+    pub fn place_about(&mut self, motions: &[Motion], origin: &Vec3) {
+        self.place_by(origin, |link| local_pose(&motions[link as usize], origin));
     }
 
     /// Puts all skeletons where links have these poses in a frame about `origin`.

@@ -110,15 +110,6 @@ impl Standing {
         });
     }
 
-    /// Puts the skeletons where their links are, in the frame that the surface has.
-    pub fn put_forward(&self, pair: &mut Pair, motions: &[Motion]) {
-        let origin = self.places[0].center;
-        pair.place_by(&origin, |link| {
-            let Motion { center, rotation, local_center, .. } = motions[link as usize];
-            pose_about(&origin, &center, rotation, &local_center)
-        });
-    }
-
     /// The velocity that would take a link in `h` seconds from where it is to where it was.
     pub fn velocity(&self, link: u32, motion: &Motion, h: f64) -> Twist {
         let Some(place) = self.of(link) else { return motion.twist };

@@ -42,8 +42,9 @@ pub struct Blocks {
 struct Matrix {
     /// Where each class of each row's couplings ends.
     ends: Vec<[u32; 3]>,
-    /// Row by row and class by class: which coupling, its other row, and its block.
+    /// Row by row and class by class: which coupling, its row, the other one, and its block.
     sources: Vec<u32>,
+    owners: Vec<u32>,
     others: Vec<u32>,
     entries: Vec<Block>,
 }
@@ -142,7 +143,7 @@ impl Block {
         Some(inverse)
     }
 
-    /// The product with `x`, in two strands that do not wait for each other.
+    /// Adds the product with `x`, in two strands that do not wait for each other.
     #[inline(always)]
     fn add_product(&self, x: &Column, strands: &mut [Column; 2]) {
         for (columns, x) in self.0.chunks_exact(2).zip(x.0.chunks_exact(2)) {
@@ -213,6 +214,7 @@ impl Blocks {
         self.others.clear();
         self.matrix.ends.clear();
         self.matrix.sources.clear();
+        self.matrix.owners.clear();
         self.matrix.others.clear();
     }
 
@@ -244,6 +246,7 @@ impl Blocks {
             }
             matrix.sources.len() as u32
         });
+        matrix.owners.resize(matrix.sources.len(), row as u32);
         matrix.ends.push(ends);
     }
 
@@ -322,21 +325,12 @@ impl Blocks {
 impl Matrix {
     /// Takes over the couplings, scaled.
     fn scale(&mut self, entries: &[Block], rows: &[Row], team: &Team) {
-        let Self { ends, sources, others, entries: scaled } = self;
+        let Self { ends, sources, owners, others, entries: scaled } = self;
         scaled.resize(sources.len(), Block::default());
-        let owner = |place: usize| ends.partition_point(|ends| ends[2] as usize <= place);
-        let all = &mut scaled[..];
-        let size = sources.len().div_ceil(2 * team.workers()).max(1);
-        team.each_row(all, size, &mut vec![(); sources.len().div_ceil(size)], |part, scaled, ()| {
-            let mut row = owner(part * size);
-            for (place, scaled) in (part * size..).zip(scaled) {
-                while ends[row][2] as usize <= place {
-                    row += 1;
-                }
-                let (left, right) = (&rows[row].scale, &rows[others[place] as usize].scale);
-                let sign = if place < ends[row][Class::Upper as usize] as usize { -1.0 } else { 1.0 };
-                *scaled = entries[sources[place] as usize].between(left, right, sign);
-            }
+        team.each_mut(scaled, team.share(sources.len(), 1), |place, scaled| {
+            let (row, other) = (owners[place] as usize, others[place] as usize);
+            let sign = if place < ends[row][Class::Upper as usize] as usize { -1.0 } else { 1.0 };
+            *scaled = entries[sources[place] as usize].between(&rows[row].scale, &rows[other].scale, sign);
         });
     }
 
