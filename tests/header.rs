@@ -23,6 +23,7 @@ const SECTIONS: &[(&str, &str)] = &[
     ("motion", "Motion of one link"),
     ("buffer", "Bulk calls"),
     ("bulk", ""),
+    ("articulation", "Articulations"),
     ("tasks", "Threads of the host"),
     ("report", "What a step reports"),
     ("snapshot", "Snapshots"),

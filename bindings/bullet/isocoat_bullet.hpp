@@ -30,11 +30,14 @@
 // Core       A coat does not replace the body's shape. Filter the shapes against those of coat partners
 //            (add_coated_body or ignore_core), let them collide with the plain world, and see enable_ccd.
 // Held       Every tick the coupler sees which bodies are held: by enabled constraints, and by contacts of their shapes.
-//            isocoat solves what these touch implicitly: it rests soundly, and bounces less than free bodies do. While
-//            one of the bodies that constraints join touches, the coupler works out from the constraints' rows how it
-//            answers pushes, so that it may carry any load; it asks each constraint once more a tick for its rows.
-//            Where several touch at once, or contacts of Bullet's own hold a body, what holds it is estimated: stable
-//            while the body with its joints is at most ten times as heavy as without them, where its coat is.
+//            isocoat solves what these touch implicitly: it rests soundly, and bounces less than free bodies do.
+// Joints     While bodies that constraints join touch, the coupler works out from the constraints' rows how all of
+//            them answer pushes, so that they may carry any load; it asks each constraint once more a tick for its
+//            rows. What contacts push is passed on to all of them at once: bodies without a coat get velocities too.
+//            So a joint's applied impulse is without what contacts ask of it. Constraints with joint feedback or a
+//            breaking threshold keep all of theirs: they are left to Bullet alone, as are limits and motors. What
+//            these and contacts of Bullet's own do to a body is estimated: stable while they make it at most three
+//            times as heavy, where its coat is.
 // Limits     Bullet's joint limits are no places to rest at. By default a hinge bounces off them, and a limit has a row
 //            only while it is passed: a link that leans on one moves by 0.1 m/s for ever, without any coat. Let limits
 //            give a little: hinge.setLimit(low, high, 0.9, 0.3, 0), hinge.setParam(BT_CONSTRAINT_STOP_CFM, 0.3),
@@ -146,6 +149,9 @@ public:
         try {
             tick(dt);
         } catch (const std::exception &error) {
+            for (attachment &entry : entries_) {
+                entry.follows = 0;
+            }
             report(error.what());
         }
     }
@@ -180,6 +186,13 @@ protected:
     virtual bool has_link(isocoat_link link) const { return position_of(link) < entries_.size(); }
 
     isocoat_world *coats() const { return world_; }
+
+    /// Says before a step how links that joints hold together answer pushes, as isocoat_world_set_articulations has it.
+    void add_articulation(const std::vector<isocoat_link> &links, const std::vector<double> &inverse_inertia) {
+        articulated_.insert(articulated_.end(), links.begin(), links.end());
+        link_counts_.push_back(links.size());
+        inverse_inertias_.insert(inverse_inertias_.end(), inverse_inertia.begin(), inverse_inertia.end());
+    }
 
     static bool same(isocoat_link a, isocoat_link b) {
         return a.index == b.index && a.generation == b.generation && a.world == b.world;
@@ -217,15 +230,17 @@ private:
         detail::motion told;
         /// Accelerations as isocoat was told.
         detail::motion expected;
-        /// isocoat was told how the body answers pushes with its joints, and with which acceleration.
+        /// isocoat was told how the body answers pushes with its joints, and what they let it do, as an acceleration.
         bool jointed = false;
-        std::array<double, 36> mobility{};
         detail::vector6 acceleration{};
-        /// Velocities that it should have at the next tick, and what was missing, as an acceleration.
-        detail::vector6 awaited{};
+        /// Velocities with which it went into the last tick, what it did by itself in the tick before that, and for how
+        /// many ticks this is known. What has been missing, and by how much it was off in the last tick. Accelerations.
+        detail::vector6 left{};
+        detail::vector6 before{};
+        unsigned follows = 0;
         detail::vector6 missing{};
-        /// The last impulse of its contacts, and for how many ticks it counts as touching still.
-        detail::vector6 pushed{};
+        detail::vector6 off{};
+        /// For how many ticks it counts as touching still.
         int touching = 0;
         /// Sleeping bodies: what gravity and contacts usually add to the velocities in a tick; what came beyond.
         detail::motion usual;
@@ -243,12 +258,8 @@ private:
     static constexpr int held_ticks = 6;
 
     /// Part of what was missing in a tick that goes into the estimate of it: stable while a body answers a push at
-    /// least a tenth as readily as isocoat is told.
-    static constexpr double learned = 0.1;
-
-    /// A body that answers pushes with its joints by less than this part of what it would without is heavy: the
-    /// estimate of what holds it is stable down to a tenth. The others keep it, which damps better what swings fast.
-    static constexpr double heavy = 0.15;
+    /// least that part as readily as isocoat is told.
+    static constexpr double learned = 0.3;
 
     std::size_t find(const btRigidBody *body) const {
         const auto found = of_body_.find(body);
@@ -302,6 +313,7 @@ private:
         }
         tell_joints(dt);
         before_step(dt);
+        tell_articulations();
         detail::check(isocoat_world_step(world_, double(dt)), "step");
         apply(dt);
         after_step(dt);
@@ -386,6 +398,7 @@ private:
                 // A link that is gone shows in push_states.
                 (void)(isocoat_link_teleport(world_, entry.link, &state) == ISOCOAT_OK);
                 entry.touching = entry.jumped ? 0 : entry.touching;
+                entry.follows = 0;
                 entry.jumped = false;
             }
             links_.push_back(entry.link);
@@ -400,14 +413,13 @@ private:
         const btRigidBody &body = *entry.body;
         const detail::response now = detail::response::of(body);
         // The matrix of a body that is held in some direction turns with it.
-        const bool turned = now.is_dynamic() && !now.is_free() && !entry.jointed &&
-                            !(body.getWorldTransform().getBasis() == entry.basis);
+        const bool turned = now.is_dynamic() && !now.is_free() && !(body.getWorldTransform().getBasis() == entry.basis);
         const bool constrained = entry.held > 0 && now.is_dynamic();
         const bool changed = constrained != entry.constrained;
         entry.constrained = constrained;
-        if (turned || !(now == entry.response) || (changed && !now.is_free() && !entry.jointed)) {
+        if (turned || !(now == entry.response) || (changed && !now.is_free())) {
             describe_again(entry, now);
-        } else if (changed && !entry.jointed) {
+        } else if (changed) {
             // A link that is gone shows in push_states.
             (void)(isocoat_link_set_constrained(world_, entry.link, constrained) == ISOCOAT_OK);
         }
@@ -447,7 +459,6 @@ private:
         if (isocoat_link_set_desc(world_, entry.link, &desc) == ISOCOAT_OK) {
             entry.response = now;
             entry.basis = entry.body->getWorldTransform().getBasis();
-            entry.jointed = false;
         } else {
             report("isocoat: a body's new mass or inertia is refused: " + detail::last_error());
         }
@@ -463,8 +474,7 @@ private:
             // Gravity is not among the forces of a sleeping body.
             expected.linear = body.getGravity() * body.getLinearFactor();
         } else {
-            expected.linear = body.getTotalForce() * body.getInvMass();
-            expected.angular = body.getInvInertiaTensorWorld() * body.getTotalTorque();
+            expected = detail::acceleration_of(body);
         }
         if (expected.linear == entry.expected.linear && expected.angular == entry.expected.angular) {
             return;
@@ -479,64 +489,76 @@ private:
                                                       acceleration.data() + 3) == ISOCOAT_OK;
     }
 
-    /// Tells isocoat how heavy bodies on joints answer pushes, and what the joints let them do by themselves. Bodies
-    /// that sleep stay as they were told.
+    /// Tells isocoat how bodies on joints that touch answer pushes, and what the joints let them do by themselves. What
+    /// bodies that sleep do was told before.
     void tell_joints(btScalar dt) {
+        articulated_.clear();
+        link_counts_.clear();
+        inverse_inertias_.clear();
         joints_.find(*dynamics_);
         for (const std::size_t i : movers_) {
             const attachment &entry = entries_[i];
             if (detail::joints::member *one = joints_.of(entry.body)) {
                 one->external = detail::six(entry.expected);
-                one->pushed = entry.pushed;
                 one->touching = entry.touching > 0;
             }
         }
         joints_.solve(*dynamics_, dt);
         for (const std::size_t i : movers_) {
             attachment &entry = entries_[i];
-            if (entry.asleep && entry.jointed) {
-                continue;
-            }
             const detail::joints::member *one = joints_.of(entry.body);
-            if (one != nullptr && one->solved && needs_joints(entry, *one)) {
-                tell_joints_of(entry, *one, dt);
-            } else if (entry.jointed) {
-                describe_again(entry, entry.response);
-                (void)tell_acceleration(entry, detail::six(entry.expected));
+            const bool jointed = one != nullptr && one->solved;
+            if (jointed && !entry.asleep) {
+                foresee(entry, one->acceleration, dt);
+                (void)tell_acceleration(entry, entry.acceleration);
+            } else if (!jointed) {
+                if (entry.jointed) {
+                    (void)tell_acceleration(entry, detail::six(entry.expected));
+                }
             }
+            entry.before = own_doing(entry, dt);
+            entry.jointed = jointed;
+        }
+        for (const detail::joints::articulation &one : joints_.articulations()) {
+            std::vector<isocoat_link> links;
+            for (const std::size_t member : one.members) {
+                links.push_back(entries_[find(joints_.members()[member].body)].link);
+            }
+            add_articulation(links, one.inverse_inertia);
         }
     }
 
-    /// Whether joints make a body so much heavier, where it is pushed, that an estimate of what holds it is at stake.
-    static bool needs_joints(const attachment &entry, const detail::joints::member &one) {
-        const double free = detail::dot(entry.pushed, detail::product(one.lone, entry.pushed));
-        const double held = detail::dot(entry.pushed, detail::product(one.mobility, entry.pushed));
-        return entry.touching > 0 && held < (entry.jointed ? 2.0 : 1.0) * heavy * free;
+    void tell_articulations() {
+        if (isocoat_world_set_articulations(world_, articulated_.data(), link_counts_.data(), inverse_inertias_.data(),
+                                            link_counts_.size()) != ISOCOAT_OK) {
+            report("isocoat: how bodies on joints answer pushes is refused: " + detail::last_error());
+            // What was said in the last tick is no longer so.
+            (void)(isocoat_world_set_articulations(world_, nullptr, nullptr, nullptr, 0) == ISOCOAT_OK);
+        }
     }
 
-    void tell_joints_of(attachment &entry, const detail::joints::member &one, btScalar dt) {
-        const detail::vector6 velocity = detail::six(entry.told);
+    /// What a body did in the last tick by itself, as an acceleration.
+    static detail::vector6 own_doing(const attachment &entry, btScalar dt) {
+        detail::vector6 was = detail::six(entry.told);
         for (std::size_t i = 0; i < 6; ++i) {
-            // Bullet solves joints in a few iterations, and contacts of its own may hold the body as well.
-            const bool goes_on = entry.jointed && entry.touching > 0;
-            const double off = velocity[i] - entry.awaited[i];
-            entry.missing[i] = goes_on ? entry.missing[i] + off * (learned / double(dt)) : 0.0;
-            entry.acceleration[i] = one.acceleration[i] + entry.missing[i];
-            entry.awaited[i] = velocity[i] + entry.acceleration[i] * double(dt);
+            was[i] = (was[i] - entry.left[i]) / double(dt);
         }
-        isocoat_link_desc desc = isocoat_link_desc_default();
-        if (isocoat_link_get_desc(world_, entry.link, &desc) != ISOCOAT_OK) {
-            return;  // shows when its state is set
-        }
-        desc.flags |= ISOCOAT_LINK_CONSTRAINED | ISOCOAT_LINK_HAS_INVERSE_EFFECTIVE_INERTIA;
-        std::copy(one.mobility.begin(), one.mobility.end(), desc.inverse_effective_inertia);
-        std::copy(entry.acceleration.begin(), entry.acceleration.begin() + 3, desc.external_acceleration);
-        std::copy(entry.acceleration.begin() + 3, entry.acceleration.end(), desc.external_angular_acceleration);
-        if (isocoat_link_set_desc(world_, entry.link, &desc) == ISOCOAT_OK) {
-            entry.jointed = true;
-            entry.mobility = one.mobility;
-        } else {
-            report("isocoat: how a body on joints answers pushes is refused: " + detail::last_error());
+        return was;
+    }
+
+    /// Works out what a body on joints is going to do without pushes: what the rows say, and what has been missing in
+    /// them. Bullet solves joints in a few iterations, and limits or contacts of its own may hold the body as well. What
+    /// was off for one tick only was a push of the host's.
+    static void foresee(attachment &entry, const detail::vector6 &rows, btScalar dt) {
+        const detail::vector6 was = own_doing(entry, dt);
+        for (std::size_t i = 0; i < 6; ++i) {
+            const double off = was[i] - (entry.jointed ? entry.acceleration[i] : rows[i]);
+            const double before = entry.jointed ? entry.off[i] : entry.before[i] - rows[i];
+            const bool lasts = entry.follows > 1 && off * before > 0.0;
+            const double lasting = lasts ? std::copysign(std::min(std::abs(off), std::abs(before)), off) : 0.0;
+            entry.missing[i] = entry.jointed ? entry.missing[i] + learned * lasting : lasting;
+            entry.off[i] = off;
+            entry.acceleration[i] = rows[i] + entry.missing[i];
         }
     }
 
@@ -643,24 +665,21 @@ private:
             const double *numbers = impulses_.data() + 6 * i;
             const detail::motion impulse{detail::vector_from(numbers), detail::vector_from(numbers + 3)};
             if (!entry.asleep) {
-                await(entry, detail::six(impulse));
+                const bool touches = std::any_of(numbers, numbers + 6, [](double x) { return x != 0.0; });
+                entry.touching = touches ? held_ticks : std::max(entry.touching - 1, 0);
             }
             if (!entry.asleep || stirs(entry, dt)) {
                 push(entry, impulse);
+                if (detail::joints::member *one = joints_.of(entry.body)) {
+                    one->impulse = detail::six(impulse);
+                }
             }
         }
-    }
-
-    /// Notes what contacts do to a body.
-    static void await(attachment &entry, const detail::vector6 &impulse) {
-        const bool touched = std::any_of(impulse.begin(), impulse.end(), [](double x) { return x != 0.0; });
-        entry.touching = touched ? held_ticks : std::max(entry.touching - 1, 0);
-        if (touched || entry.touching == 0) {
-            entry.pushed = impulse;
-        }
-        const detail::vector6 change = detail::product(entry.mobility, impulse);
-        for (std::size_t i = 0; i < 6; ++i) {
-            entry.awaited[i] += change[i];
+        joints_.pass_on(*dynamics_, dt);
+        for (const std::size_t i : movers_) {
+            const btRigidBody &body = *entries_[i].body;
+            entries_[i].left = detail::six(detail::motion{body.getLinearVelocity(), body.getAngularVelocity()});
+            ++entries_[i].follows;
         }
     }
 
@@ -813,6 +832,10 @@ private:
     std::vector<std::size_t> movers_;
     std::vector<double> impulses_;
     detail::joints joints_;
+    /// All articulations, one after the other.
+    std::vector<isocoat_link> articulated_;
+    std::vector<std::size_t> link_counts_;
+    std::vector<double> inverse_inertias_;
     /// Links and states of the last tick, and for how many ticks they have been so.
     std::vector<std::pair<isocoat_link, isocoat_link_state>> rested_;
     unsigned resting_ = 0;

@@ -31,6 +31,11 @@ struct motion {
     btVector3 angular{0, 0, 0};
 };
 
+/// What the forces on a body do to it by themselves.
+inline motion acceleration_of(const btRigidBody &body) {
+    return {body.getTotalForce() * body.getInvMass(), body.getInvInertiaTensorWorld() * body.getTotalTorque()};
+}
+
 inline std::string last_error() {
     std::string text(isocoat_last_error(nullptr, 0) + 1, '\0');
     text.resize(std::min(isocoat_last_error(text.data(), text.size()), text.size() - 1));

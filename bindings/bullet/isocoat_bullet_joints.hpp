@@ -3,12 +3,19 @@
 //
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //
-// The rows of all enabled constraints of an island, J u = r - C l with impulses l between bounds, are those that
-// Bullet's solver is about to get: the constraints are asked for them at the poses in which the tick begins. With the
-// inverse masses W, and S = J W J^T + C over the rows that are at work, a push on the bodies changes their velocities
-// by A = W - W J^T S^-1 J W, of which isocoat gets the 6x6 block of each body. Bullet's solver comes near that solution
-// in as many iterations as its host gives it. Bodies of one island that touch at once move each other, which no matrix
-// of one of them says: such islands are left out, and what holds their bodies is estimated.
+// The rows of all enabled constraints of an island, J u = r - C l with impulses l, are those that Bullet's solver is about
+// to get: the constraints are asked for them at the poses in which the tick begins. With the inverse masses W, and
+// S = J W J^T + C, pushes on the bodies change their velocities by A = W - W J^T S^-1 J W. isocoat gets A of those
+// bodies that touch as an articulation.
+//
+// What contacts push is passed on to the whole island by the same rows, so that its bodies' velocities still keep to
+// them. Bullet's solver alone would stop short of that: a light body between heavy ones takes more iterations than any
+// host gives, and would fly off with a push that was meant for all of them.
+//
+// Rows with bounds or that give way are left to Bullet: limits, motors, brakes. Which of them are at work, and how hard, is seen only when
+// its solver has run, and a limit that seems to hold for a tick too long throws the body off. Left to it are also
+// constraints that may break or are asked for their impulses, which must show all that they carry. What these do to a
+// body is estimated.
 #ifndef ISOCOAT_BULLET_JOINTS_HPP
 #define ISOCOAT_BULLET_JOINTS_HPP
 
@@ -67,28 +74,42 @@ inline matrix6 lone_mobility(const btRigidBody &body) {
     return out;
 }
 
+/// What of a body's mobility joints leave it at least, on the diagonal: of the mass and inertia that it has or would have.
+inline vector6 least_mobility(const btRigidBody &body, double part) {
+    const btVector3 &turning = body.getInvInertiaDiagLocal();
+    const double linear = part * double(body.getInvMass());
+    const double most = double(std::max(turning.x(), std::max(turning.y(), turning.z())));
+    const double angular = most > 0.0 ? part * most : linear;
+    return {linear, linear, linear, angular, angular, angular};
+}
+
 /// Dynamic bodies on constraints, island by island.
 class joints {
 public:
     /// What moves a body in the coming tick, apart from constraints.
     struct member {
-        const btRigidBody *body = nullptr;
+        btRigidBody *body = nullptr;
         /// As an acceleration.
         vector6 external{};
-        /// The last impulse of its contacts: it tells which limits are at work.
-        vector6 pushed{};
         /// Contacts act on it.
         bool touching = false;
-        /// What comes out, unless several bodies of the island touch: whether the island could be solved; how the body
-        /// answers pushes; its acceleration without any.
+        /// Their impulse in this tick.
+        vector6 impulse{};
+        /// What comes out for those that touch, if their island could be solved: its acceleration without any push.
         bool solved = false;
-        matrix6 mobility{};
         vector6 acceleration{};
 
         std::size_t island = 0;
         /// Velocity at the end of the tick without constraints.
         vector6 free{};
         matrix6 lone{};
+    };
+
+    /// Bodies that constraints join and that touch, and how pushes on any of them move all.
+    struct articulation {
+        std::vector<std::size_t> members;
+        /// Row by row, six rows and columns a member.
+        std::vector<double> inverse_inertia;
     };
 
     /// Finds the bodies that enabled constraints join.
@@ -98,7 +119,8 @@ public:
         constraints_.clear();
         for (int i = 0; i < dynamics.getNumConstraints(); ++i) {
             btTypedConstraint *constraint = dynamics.getConstraint(i);
-            if (constraint->isEnabled()) {
+            if (constraint->isEnabled() && takes_part(constraint->getRigidBodyA()) &&
+                takes_part(constraint->getRigidBodyB())) {
                 const std::size_t a = enter(constraint->getRigidBodyA()), b = enter(constraint->getRigidBodyB());
                 if (a != nobody && b != nobody) {
                     const std::size_t low = std::min(root(a), root(b)), high = std::max(root(a), root(b));
@@ -121,7 +143,9 @@ public:
         return found == of_body_.end() ? nullptr : &members_[found->second];
     }
 
-    /// Works out how all of them answer pushes.
+    const std::vector<articulation> &articulations() const { return articulations_; }
+
+    /// Works out how those that touch answer pushes.
     void solve(btDiscreteDynamicsWorld &dynamics, btScalar dt) {
         for (member &one : members_) {
             one.lone = lone_mobility(*one.body);
@@ -132,14 +156,56 @@ public:
         }
         const auto before = [&](const joint &one, const joint &other) { return island_of(one) < island_of(other); };
         std::stable_sort(constraints_.begin(), constraints_.end(), before);
-        for (std::size_t first = 0, last = 0; first < constraints_.size(); first = last) {
-            const std::size_t island = island_of(constraints_[first]);
-            rows_.clear();
-            for (; last < constraints_.size() && island_of(constraints_[last]) == island; ++last) {
-                add_rows(constraints_[last], dynamics.getSolverInfo(), dt);
+        islands_.clear();
+        articulations_.clear();
+        for (std::size_t i = 0; i < constraints_.size(); ++i) {
+            if (i == 0 || island_of(constraints_[i]) != islands_.back().name) {
+                islands_.emplace_back();
+                islands_.back().name = island_of(constraints_[i]);
+                islands_.back().first = i;
             }
-            if (!rows_.empty() && rows_.size() <= most_rows && touched_in(island) < 2) {
-                solve_island(island, dt);
+            islands_.back().last = i + 1;
+        }
+        for (island &of : islands_) {
+            const auto touches = [&](const member &one) { return one.island == of.name && one.touching; };
+            if (std::none_of(members_.begin(), members_.end(), touches) || !prepare(of, dynamics, dt)) {
+                continue;
+            }
+            articulation made;
+            for (std::size_t i = 0; i < members_.size(); ++i) {
+                const auto reaches = [&](const row &one) { return one.ends[0] == i || one.ends[1] == i; };
+                if (touches(members_[i]) && std::any_of(of.rows.begin(), of.rows.end(), reaches)) {
+                    made.members.push_back(i);
+                }
+            }
+            if (!made.members.empty() && made.members.size() <= most_members) {
+                answer(of, made, dt);
+                articulations_.push_back(std::move(made));
+            }
+        }
+    }
+
+    /// Passes the impulses of this tick's contacts on to the islands of their bodies.
+    void pass_on(btDiscreteDynamicsWorld &dynamics, btScalar dt) {
+        for (island &of : islands_) {
+            const auto is_pushed = [&](const member &one) {
+                return one.island == of.name &&
+                       std::any_of(one.impulse.begin(), one.impulse.end(), [](double x) { return x != 0.0; });
+            };
+            // Of an island that is just being woken, others get no impulse in this tick.
+            const auto sleeps = [&](const member &one) { return one.island == of.name && !one.body->isActive(); };
+            if (std::none_of(members_.begin(), members_.end(), is_pushed) ||
+                std::any_of(members_.begin(), members_.end(), sleeps) ||
+                !(of.ready || (!of.asked && prepare(of, dynamics, dt)))) {
+                continue;
+            }
+            solve_rows(of, [&](const row &one) {
+                return -sum_over(one, [&](const member &end) { return product(end.lone, end.impulse); });
+            });
+            for (std::size_t i = 0; i < members_.size(); ++i) {
+                if (members_[i].island == of.name) {
+                    move(*members_[i].body, product(members_[i].lone, held_by(of, i)));
+                }
             }
         }
     }
@@ -150,8 +216,18 @@ private:
     /// The matrix of an island is full: beyond this many rows it costs more than it is worth.
     static constexpr std::size_t most_rows = 300;
 
+    /// Bodies that may touch at once in an island: the matrix of an articulation is full as well.
+    static constexpr std::size_t most_members = 64;
+
+    /// Softness of a row, over what it would be by itself, from which on it is left to Bullet: its solver would give in to
+    /// what is passed on once more.
+    static constexpr double soft = 1e-3;
+
     /// Softness of every row, as a part of what it would be by itself: rows that say the same twice leave it solvable.
     static constexpr double little = 1e-7;
+
+    /// Part of a body's own inverse inertia that its joints leave it in every direction: otherwise none is left in some.
+    static constexpr double left_over = 1e-6;
 
     struct joint {
         btTypedConstraint *constraint;
@@ -161,13 +237,28 @@ private:
     struct row {
         std::size_t ends[2];
         vector6 jacobian[2];
-        double target, softness, lower, upper;
-        /// It holds; otherwise its impulse is at a bound.
-        bool holds;
-        double impulse;
+        double target, softness, impulse;
     };
 
-    std::size_t enter(const btRigidBody &body) {
+    /// Bodies that constraints join, with the rows of these.
+    struct island {
+        std::size_t name = 0;
+        /// Its constraints.
+        std::size_t first = 0, last = 0;
+        std::vector<row> rows;
+        /// Cholesky's factor of S, row by row.
+        std::vector<double> factor;
+        bool asked = false, ready = false;
+    };
+
+    /// Others may have been deleted from the dynamics world, or stand still by decree; what a constraint does between
+    /// them is left to Bullet.
+    static bool takes_part(const btRigidBody &body) {
+        return body.isStaticOrKinematicObject() ||
+               (body.isInWorld() && body.getActivationState() != DISABLE_SIMULATION);
+    }
+
+    std::size_t enter(btRigidBody &body) {
         if (body.isStaticOrKinematicObject() || !(body.getInvMass() > 0)) {
             return nobody;
         }
@@ -175,6 +266,7 @@ private:
         if (at.second) {
             member fresh;
             fresh.body = &body;
+            fresh.external = six(acceleration_of(body));
             fresh.island = members_.size();
             members_.push_back(fresh);
         }
@@ -190,17 +282,25 @@ private:
 
     std::size_t island_of(const joint &one) const { return members_[one.a != nobody ? one.a : one.b].island; }
 
-    std::ptrdiff_t touched_in(std::size_t island) const {
-        return std::count_if(members_.begin(), members_.end(),
-                             [&](const member &one) { return one.island == island && one.touching; });
+    /// Asks an island's constraints for their rows, and factorizes S; false where there are none, or too many.
+    bool prepare(island &of, btDiscreteDynamicsWorld &dynamics, btScalar dt) {
+        of.asked = true;
+        of.rows.clear();
+        for (std::size_t i = of.first; i < of.last; ++i) {
+            add_rows(of.rows, constraints_[i], dynamics.getSolverInfo(), dt);
+        }
+        of.ready = !of.rows.empty() && of.rows.size() <= most_rows && factorize(of);
+        return of.ready;
     }
 
     /// The rows of a constraint, asked for as Bullet's solver does.
-    void add_rows(const joint &of, const btContactSolverInfo &solver, btScalar dt) {
+    void add_rows(std::vector<row> &rows, const joint &of, const btContactSolverInfo &solver, btScalar dt) {
         btTypedConstraint::btConstraintInfo1 size;
         of.constraint->getInfo1(&size);
         const int count = size.m_numConstraintRows;
-        if (count <= 0) {
+        const bool shows = of.constraint->needsFeedback() ||
+                           of.constraint->getBreakingImpulseThreshold() < btScalar(SIMD_INFINITY);
+        if (count <= 0 || shows) {
             return;
         }
         // A row in the table: two linear and two angular axes, each with room for a vector of Bullet's; four numbers.
@@ -228,122 +328,54 @@ private:
             info.m_upperLimit[skip * i] = SIMD_INFINITY;
         }
         of.constraint->getInfo2(&info);
-        const btScalar breaking = of.constraint->getBreakingImpulseThreshold();
         for (int i = 0; i < count; ++i) {
             const btScalar *from = first + skip * i;
             row made{};
             made.ends[0] = of.a;
             made.ends[1] = of.b;
+            made.target = double(from[16]);
             double own = 0.0;
             for (std::size_t end = 0; end < 2; ++end) {
-                if (made.ends[end] == nobody) {
-                    continue;
-                }
                 for (std::size_t k = 0; k < 3; ++k) {
                     made.jacobian[end][k] = double(from[8 * end + k]);
                     made.jacobian[end][3 + k] = double(from[8 * end + 4 + k]);
                 }
+                if (made.ends[end] == nobody) {
+                    const btRigidBody &body = end == 0 ? of.constraint->getRigidBodyA() : of.constraint->getRigidBodyB();
+                    if (body.isKinematicObject()) {
+                        made.target -= dot(made.jacobian[end],
+                                           six(motion{body.getLinearVelocity(), body.getAngularVelocity()}));
+                    }
+                    continue;
+                }
                 own += dot(made.jacobian[end], product(members_[made.ends[end]].lone, made.jacobian[end]));
             }
-            if (!(own > 0.0)) {
+            const bool bounded = from[18] > -SIMD_INFINITY || from[19] < SIMD_INFINITY;
+            if (bounded || double(from[17]) > soft || !(own > 0.0)) {
                 continue;
             }
-            made.target = double(from[16]);
             made.softness = own * (double(from[17]) + little);
-            made.lower = double(std::max(from[18], -breaking));
-            made.upper = double(std::min(from[19], breaking));
-            rows_.push_back(made);
+            rows.push_back(made);
         }
     }
 
-    /// What the row's velocity is at these velocities of the bodies.
-    double velocity_of(const row &of, const std::vector<vector6> &velocities) const {
+    /// What a row sees of something that each body has.
+    template <class of_member>
+    double sum_over(const row &of, of_member get) const {
         double sum = 0.0;
         for (std::size_t end = 0; end < 2; ++end) {
             if (of.ends[end] != nobody) {
-                sum += dot(of.jacobian[end], velocities[of.ends[end]]);
+                sum += dot(of.jacobian[end], get(members_[of.ends[end]]));
             }
         }
         return sum;
     }
 
-    void solve_island(std::size_t island, btScalar dt) {
-        for (row &one : rows_) {
-            one.holds = true;
-            one.impulse = 0.0;
-        }
-        // Which rows are at their bounds, under the load that contacts had in the last tick. Few change their minds.
-        velocities_.resize(members_.size());
-        bool settled = false;
-        for (int turn = 0; turn < 8 && !settled; ++turn) {
-            set_velocities(island, true);
-            if (!factorize()) {
-                return;
-            }
-            solve_rows();
-            settled = true;
-            for (row &one : rows_) {
-                if (one.holds && (one.impulse < one.lower || one.impulse > one.upper)) {
-                    one.holds = false;
-                    one.impulse = std::min(std::max(one.impulse, one.lower), one.upper);
-                    settled = false;
-                }
-            }
-        }
-        if (!factorize()) {
-            return;
-        }
-        set_velocities(island, false);
-        solve_rows();
-        for (member &one : members_) {
-            if (one.island == island) {
-                answer(one, std::size_t(&one - members_.data()), dt);
-            }
-        }
-    }
-
-    /// The velocities of the island's bodies without the rows that hold.
-    void set_velocities(std::size_t island, bool loaded) {
-        for (std::size_t i = 0; i < members_.size(); ++i) {
-            const member &one = members_[i];
-            if (one.island == island) {
-                velocities_[i] = one.free;
-                if (loaded) {
-                    add(velocities_[i], product(one.lone, one.pushed));
-                }
-            }
-        }
-        for (const row &one : rows_) {
-            for (std::size_t end = 0; end < 2 && !one.holds; ++end) {
-                if (one.ends[end] != nobody) {
-                    vector6 push = one.jacobian[end];
-                    for (double &x : push) {
-                        x *= one.impulse;
-                    }
-                    add(velocities_[one.ends[end]], product(members_[one.ends[end]].lone, push));
-                }
-            }
-        }
-    }
-
-    static void add(vector6 &to, const vector6 &what) {
-        for (std::size_t i = 0; i < 6; ++i) {
-            to[i] += what[i];
-        }
-    }
-
-    /// Cholesky's factor of S over the rows that hold.
-    bool factorize() {
-        holding_.clear();
-        for (std::size_t i = 0; i < rows_.size(); ++i) {
-            if (rows_[i].holds) {
-                holding_.push_back(i);
-            }
-        }
-        const std::size_t size = holding_.size();
-        factor_.assign(size * size, 0.0);
+    bool factorize(island &of) const {
+        const std::size_t size = of.rows.size();
+        of.factor.assign(size * size, 0.0);
         for (std::size_t i = 0; i < size; ++i) {
-            const row &at = rows_[holding_[i]];
+            const row &at = of.rows[i];
             vector6 moved[2];
             for (std::size_t end = 0; end < 2; ++end) {
                 if (at.ends[end] != nobody) {
@@ -351,20 +383,20 @@ private:
                 }
             }
             for (std::size_t j = 0; j <= i; ++j) {
-                const row &other = rows_[holding_[j]];
+                const row &other = of.rows[j];
                 double sum = i == j ? at.softness : 0.0;
                 for (std::size_t end = 0; end < 4; ++end) {
                     if (at.ends[end / 2] != nobody && at.ends[end / 2] == other.ends[end % 2]) {
                         sum += dot(moved[end / 2], other.jacobian[end % 2]);
                     }
                 }
-                factor_[size * i + j] = sum;
+                of.factor[size * i + j] = sum;
             }
         }
         for (std::size_t i = 0; i < size; ++i) {
-            double *row_i = &factor_[size * i];
+            double *row_i = &of.factor[size * i];
             for (std::size_t j = 0; j <= i; ++j) {
-                const double *row_j = &factor_[size * j];
+                const double *row_j = &of.factor[size * j];
                 double sum = row_i[j];
                 for (std::size_t k = 0; k < j; ++k) {
                     sum -= row_i[k] * row_j[k];
@@ -382,89 +414,110 @@ private:
     }
 
     /// Takes a right hand side to the factor's inverse times it.
-    void forward(std::vector<double> &side) const {
-        const std::size_t size = holding_.size();
+    static void forward(const island &of, std::vector<double> &side) {
+        const std::size_t size = of.rows.size();
         for (std::size_t i = 0; i < size; ++i) {
             for (std::size_t k = 0; k < i; ++k) {
-                side[i] -= factor_[size * i + k] * side[k];
+                side[i] -= of.factor[size * i + k] * side[k];
             }
-            side[i] /= factor_[size * i + i];
+            side[i] /= of.factor[size * i + i];
         }
     }
 
-    /// The impulses of the rows that hold.
-    void solve_rows() {
-        const std::size_t size = holding_.size();
+    /// The impulses of the rows that change their velocities by what `wanted` says of each.
+    template <class of_row>
+    void solve_rows(island &of, of_row wanted) {
+        const std::size_t size = of.rows.size();
         side_.resize(size);
         for (std::size_t i = 0; i < size; ++i) {
-            const row &one = rows_[holding_[i]];
-            side_[i] = one.target - velocity_of(one, velocities_);
+            side_[i] = wanted(of.rows[i]);
         }
-        forward(side_);
+        forward(of, side_);
         for (std::size_t i = size; i-- > 0;) {
             for (std::size_t k = i + 1; k < size; ++k) {
-                side_[i] -= factor_[size * k + i] * side_[k];
+                side_[i] -= of.factor[size * k + i] * side_[k];
             }
-            side_[i] /= factor_[size * i + i];
-            rows_[holding_[i]].impulse = side_[i];
+            side_[i] /= of.factor[size * i + i];
+            of.rows[i].impulse = side_[i];
         }
     }
 
-    void answer(member &one, std::size_t position, btScalar dt) {
-        const std::size_t size = holding_.size();
+    /// What the rows do to a body: a wrench times the tick.
+    static vector6 held_by(const island &of, std::size_t position) {
         vector6 push{};
-        std::array<std::vector<double>, 6> columns;
-        for (std::vector<double> &column : columns) {
-            column.assign(size, 0.0);
-        }
-        for (const row &at : rows_) {
+        for (const row &at : of.rows) {
             for (std::size_t end = 0; end < 2; ++end) {
                 for (std::size_t k = 0; at.ends[end] == position && k < 6; ++k) {
                     push[k] += at.jacobian[end][k] * at.impulse;
                 }
             }
         }
-        for (std::size_t i = 0; i < size; ++i) {
-            const row &at = rows_[holding_[i]];
-            for (std::size_t end = 0; end < 2; ++end) {
-                if (at.ends[end] == position) {
-                    const vector6 moved = product(one.lone, at.jacobian[end]);
-                    for (std::size_t k = 0; k < 6; ++k) {
-                        columns[k][i] += moved[k];
+        return push;
+    }
+
+    /// How the bodies of an articulation answer pushes, and what they do without any.
+    void answer(island &of, articulation &to, btScalar dt) {
+        solve_rows(of, [&](const row &one) {
+            return one.target - sum_over(one, [](const member &end) { return end.free; });
+        });
+        const std::size_t size = of.rows.size(), width = 6 * to.members.size();
+        columns_.resize(width);
+        to.inverse_inertia.assign(width * width, 0.0);
+        for (std::size_t i = 0; i < to.members.size(); ++i) {
+            member &one = members_[to.members[i]];
+            const vector6 least = least_mobility(*one.body, left_over);
+            for (std::size_t k = 0; k < 6; ++k) {
+                columns_[6 * i + k].assign(size, 0.0);
+                for (std::size_t l = 0; l < 6; ++l) {
+                    to.inverse_inertia[(6 * i + k) * width + 6 * i + l] = one.lone[6 * k + l];
+                }
+                to.inverse_inertia[(6 * i + k) * width + 6 * i + k] += least[k];
+            }
+            for (std::size_t j = 0; j < size; ++j) {
+                const row &at = of.rows[j];
+                for (std::size_t end = 0; end < 2; ++end) {
+                    if (at.ends[end] == to.members[i]) {
+                        const vector6 moved = product(one.lone, at.jacobian[end]);
+                        for (std::size_t k = 0; k < 6; ++k) {
+                            columns_[6 * i + k][j] += moved[k];
+                        }
                     }
                 }
             }
+            const vector6 change = product(one.lone, held_by(of, to.members[i]));
+            for (std::size_t k = 0; k < 6; ++k) {
+                one.acceleration[k] = one.external[k] + change[k] / double(dt);
+            }
+            one.solved = true;
         }
-        // Joints that leave no freedom make the matrix singular: a millionth of the lone body's is added.
-        one.mobility = one.lone;
-        for (std::size_t i = 0; i < 6; ++i) {
-            one.mobility[7 * i] *= 1.0 + 1e-6;
+        for (std::vector<double> &column : columns_) {
+            forward(of, column);
         }
-        for (std::size_t k = 0; k < 6; ++k) {
-            forward(columns[k]);
-        }
-        for (std::size_t i = 0; i < 6; ++i) {
-            for (std::size_t j = 0; j < 6; ++j) {
+        for (std::size_t i = 0; i < width; ++i) {
+            for (std::size_t j = 0; j <= i; ++j) {
+                double sum = 0.0;
                 for (std::size_t k = 0; k < size; ++k) {
-                    one.mobility[6 * i + j] -= columns[i][k] * columns[j][k];
+                    sum += columns_[i][k] * columns_[j][k];
+                }
+                to.inverse_inertia[i * width + j] -= sum;
+                if (i != j) {
+                    to.inverse_inertia[j * width + i] -= sum;
                 }
             }
         }
-        const vector6 change = product(one.lone, push);
-        for (std::size_t k = 0; k < 6; ++k) {
-            one.acceleration[k] = one.external[k] + change[k] / double(dt);
-        }
-        one.solved = true;
+    }
+
+    static void move(btRigidBody &body, const vector6 &by) {
+        body.setLinearVelocity(body.getLinearVelocity() + vector_from(by.data()));
+        body.setAngularVelocity(body.getAngularVelocity() + vector_from(by.data() + 3));
     }
 
     std::vector<member> members_;
     std::unordered_map<const btRigidBody *, std::size_t> of_body_;
     std::vector<joint> constraints_;
-    /// Of the island at hand.
-    std::vector<row> rows_;
-    std::vector<std::size_t> holding_;
-    std::vector<vector6> velocities_;
-    std::vector<double> factor_;
+    std::vector<island> islands_;
+    std::vector<articulation> articulations_;
+    std::vector<std::vector<double>> columns_;
     std::vector<double> side_;
     btAlignedObjectArray<btScalar> table_;
 };

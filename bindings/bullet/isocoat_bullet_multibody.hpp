@@ -13,12 +13,13 @@
 // What to know:
 //
 // Frames     The frame of a link is its collider's: its origin is the link's centre of mass.
-// Joints     isocoat is told how the whole multibody answers a push on the link (the inverse effective inertia), and
-//            what gravity, forces, joint torques, damping and its own motion do to the link in the coming tick. So a
-//            multibody that stands on one coat sinks by what its load makes it sink. A joint that takes freedom away
-//            makes the matrix singular: a millionth of the lone link's freedom is added in all directions.
-// Held       When the joints do not move as this predicts (limits, motors, constraints, contacts of Bullet's own), or
-//            several links of a multibody touch at once, what is missing is estimated from tick to tick.
+// Joints     isocoat is told how the whole multibody answers pushes on those links that touch (an articulation), and
+//            what gravity, forces, joint torques, damping and its own motion do to them in the coming tick. So a
+//            multibody that stands on coats sinks by what its load makes it sink. Joints that take freedom away make
+//            the matrix singular: a millionth of the lone links' freedom is added in all directions, a ten-thousandth
+//            in single precision.
+// Held       When the joints do not move as this predicts (limits, motors, constraints, contacts of Bullet's own), what
+//            is missing is estimated from tick to tick.
 // Impulses   Impulses of contact change the joint velocities at once. No force is used: forces last for a frame.
 // Sleep      A multibody that is touched stays awake.
 // Absent     A link whose multibody or collider is not in the dynamics world is disabled until both are back. Both may
@@ -222,6 +223,9 @@ protected:
         }
         limbs_.erase(std::remove_if(limbs_.begin(), limbs_.end(), [&](limb &one) { return !tell(one, dt); }),
                      limbs_.end());
+        for (auto &pair : trees_) {
+            join(*pair.second.multibody);
+        }
     }
 
     void after_step(btScalar) override {
@@ -241,6 +245,14 @@ protected:
             }
             for (std::size_t i = 0; i < one.expected.size(); ++i) {
                 one.expected[i] += one.change[i];
+            }
+        }
+        for (limb &one : limbs_) {
+            if (one.present && one.told) {
+                const std::array<double, 6> change = one.leverage.at_link(trees_[one.multibody].change.data());
+                for (std::size_t i = 0; i < 6; ++i) {
+                    one.expected[i] += change[i];
+                }
             }
         }
     }
@@ -277,6 +289,8 @@ private:
         bool jumped = true;
         /// Contacts can move it.
         bool moves = false;
+        /// One over its own mass and inertia, or what stands for them.
+        double lone_linear = 0.0, lone_angular = 0.0;
     };
 
     /// Ticks for which what comes and goes counts as there still.
@@ -285,6 +299,9 @@ private:
     /// Part of what was missing in a tick that goes into the estimate: stable while the link is at most ten times as
     /// heavy as its matrix says.
     static constexpr double learned = 0.1;
+
+    /// Part of a link's own inverse inertia that its joints leave it in every direction: otherwise none is left in some.
+    static constexpr double left_over = sizeof(btScalar) == sizeof(float) ? 1e-4 : 1e-6;
 
     /// Part of a change of the joints' velocities, and of the velocities, by which they may be off unheld.
     static constexpr double off_change = 0.01;
@@ -382,8 +399,8 @@ private:
         const std::array<double, 6> velocity = one.leverage.at_link(multibody.getVelocityVector());
         std::array<double, 6> acceleration = one.leverage.at_link(of.acceleration.data());
 
-        // Links of one multibody that touch at once move each other, which no matrix of one link says. As many times as
-        // mobile as it is, each is safe by itself.
+        // Links of one multibody that touch at once move each other. Where isocoat does not solve them together, each is
+        // safe by itself if it seems as many times as mobile as it is.
         const int others = int(std::count_if(limbs_.begin(), limbs_.end(), [&](const limb &other) {
             return &other != &one && other.multibody == one.multibody && other.touching > 0;
         }));
@@ -402,6 +419,7 @@ private:
         std::copy(velocity.begin() + 3, velocity.end(), state.angular_velocity);
         if (!detail::is_finite(state)) {
             report("isocoat: a multibody's pose or velocity is not finite");
+            one.touching = 0;
             return true;
         }
         describe(one, double(others + 1));
@@ -424,6 +442,35 @@ private:
         return true;
     }
 
+    /// Tells isocoat how the links of a multibody that touch move each other.
+    void join(const btMultiBody &multibody) {
+        std::vector<const limb *> touching;
+        std::vector<isocoat_link> links;
+        for (const limb &one : limbs_) {
+            if (one.multibody == &multibody && one.present && one.moves && one.touching > 0) {
+                touching.push_back(&one);
+                links.push_back(one.link);
+            }
+        }
+        if (touching.size() < 2) {
+            return;
+        }
+        const std::size_t width = 6 * touching.size();
+        std::vector<double> matrix(width * width);
+        for (std::size_t i = 0; i < width; ++i) {
+            for (std::size_t j = 0; j <= i; ++j) {
+                const detail::leverage &a = touching[i / 6]->leverage, &b = touching[j / 6]->leverage;
+                const double there = detail::leverage::dot(a.rows[i % 6], b.answers[j % 6].data());
+                const double back = detail::leverage::dot(b.rows[j % 6], a.answers[i % 6].data());
+                matrix[i * width + j] = matrix[j * width + i] = 0.5 * (there + back);
+            }
+            // It is singular, and rounding makes it worse than that.
+            const limb &one = *touching[i / 6];
+            matrix[i * width + i] += left_over * (i % 6 < 3 ? one.lone_linear : one.lone_angular);
+        }
+        add_articulation(links, matrix);
+    }
+
     /// How a link answers pushes, `times` as readily as the multibody by itself would.
     void describe(limb &one, double times) {
         const btMultiBody &multibody = *one.multibody;
@@ -434,8 +481,8 @@ private:
         const double linear = matrix[0] + matrix[7] + matrix[14];
         const double angular = matrix[21] + matrix[28] + matrix[35];
         const double turning = double(inertia.x() + inertia.y() + inertia.z());
-        const double lone_linear = mass > 0.0 ? 1.0 / mass : linear;
-        const double lone_angular = turning > 0.0 ? 3.0 / turning : angular;
+        const double lone_linear = one.lone_linear = mass > 0.0 ? 1.0 / mass : linear;
+        const double lone_angular = one.lone_angular = turning > 0.0 ? 3.0 / turning : angular;
         isocoat_link_desc desc = one.desc;
         one.moves = linear > 1e-9 * lone_linear || angular > 1e-9 * lone_angular;
         if (!one.moves) {
@@ -499,9 +546,6 @@ private:
         for (std::size_t i = 0; i < 6; ++i) {
             for (std::size_t joint = 0; joint < of.change.size(); ++joint) {
                 of.change[joint] += btScalar(double(one.leverage.answers[i][joint]) * wrench[i]);
-            }
-            for (std::size_t j = 0; j < 6; ++j) {
-                one.expected[i] += one.desc.inverse_effective_inertia[6 * i + j] * wrench[j];
             }
         }
     }

@@ -836,7 +836,8 @@ typedef struct isocoat_link_desc {
     /**
      * Host-driven links that joints hold: the 6x6 matrix from wrench at the centre of mass (force, torque) to
      * acceleration (linear, angular), in the world, row by row; symmetric and positive definite. Read only with
-     * ISOCOAT_LINK_HAS_INVERSE_EFFECTIVE_INERTIA in flags. Default 0.
+     * ISOCOAT_LINK_HAS_INVERSE_EFFECTIVE_INERTIA in flags. Where several links of the same joints touch, see
+     * isocoat_world_set_articulations. Default 0.
      */
     double inverse_effective_inertia[36];
     /** The host's own; given back, otherwise unused. Default NULL. */
@@ -1704,6 +1705,42 @@ isocoat_status isocoat_world_get_link_impulses(const isocoat_world *world,
                                                size_t count,
                                                isocoat_buffer linear,
                                                isocoat_buffer angular);
+
+/* ---- Articulations ----------------------------------------------------------------------------------------------- */
+
+/**
+ * Says which host-driven links move each other through the host's joints, and how, in place of all that was said
+ * before. The implicit response then solves the contacts of these links together: links on joints may touch
+ * anything, several at once, without an estimate of what holds them. Other responses take each link by itself, with
+ * its own mass or inverse_effective_inertia.
+ *
+ * Give it before a step wherever links on joints touch; only those that touch need be named. What the joints do by
+ * themselves belongs in isocoat_link_set_external_acceleration. After the step the host passes each impulse on
+ * through its joints: bodies must move as the matrix says.
+ *
+ * It holds until it is said again, or until a link is destroyed or changes its kind, which ends its articulation.
+ * Snapshots keep it.
+ *
+ * - world: not NULL.
+ * - links: all links, articulation after articulation: host-driven, with a mass, each once; not NULL unless count
+ *   is 0.
+ * - link_counts: number of links of each articulation, from 1 to 256; not NULL unless count is 0.
+ * - inverse_inertias: the matrices, one after the other: 6n rows of 6n numbers for n links, from impulses on all
+ *   links, about their centres of mass, to the changes of their velocities, in the world; for each link first the
+ *   linear part, then the angular one. Symmetric and positive definite; with joint inertia H and Jacobians J of the
+ *   links it is J H^-1 J^T, plus a millionth of the bodies' own inverse inertia where that is singular. Not NULL
+ *   unless count is 0; aligned as double.
+ * - count: number of articulations; 0 ends all.
+ *
+ * Errors: INVALID_HANDLE, INVALID_ARGUMENT, OUT_OF_RANGE, UNSUPPORTED (a link that is not host-driven, has no mass,
+ * or is named twice); nothing is changed then. Threads: changes the world.
+ */
+ISOCOAT_MUST_USE
+isocoat_status isocoat_world_set_articulations(isocoat_world *world,
+                                               const isocoat_link *links,
+                                               const size_t *link_counts,
+                                               const double *inverse_inertias,
+                                               size_t count);
 
 /* ---- Threads of the host ----------------------------------------------------------------------------------------- */
 

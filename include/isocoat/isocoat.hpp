@@ -895,6 +895,20 @@ public:
     {
         check(isocoat_world_get_link_impulses(get(), links.data(), links.size(), linear, angular));
     }
+    /* How links on the host's joints move each other, articulation after articulation. */
+    void set_articulations(span<const isocoat_link> links, span<const std::size_t> link_counts,
+                           span<const double> inverse_inertias)
+    {
+        std::size_t all = 0, numbers = 0;
+        for (const std::size_t count : link_counts) {
+            all += count;
+            numbers += 36 * count * count;
+        }
+        if (links.size() != all || inverse_inertias.size() != numbers)
+            throw error(ISOCOAT_ERROR_INVALID_ARGUMENT, "links and inverse_inertias must be as long as link_counts say");
+        check(isocoat_world_set_articulations(get(), links.data(), link_counts.data(), inverse_inertias.data(),
+                                              link_counts.size()));
+    }
 
     /* The contacts that two bodies would have at their present poses. */
     std::vector<contact> collide(const body &a, const body &b, isocoat_scheme scheme = ISOCOAT_SCHEME_AUTO,

@@ -38,7 +38,8 @@ pub type isocoat_link_flags = u32;
 /// The host itself applies the gyroscopic torque.
 pub const ISOCOAT_LINK_HOST_GYROSCOPIC: isocoat_link_flags = 1;
 /// Joints or contacts of the host act on the link in this tick, so that it does not move as its own mass would. The
-/// automatic response is implicit then; without inverse_effective_inertia, what holds it is estimated.
+/// automatic response is implicit then, as it is for links of an articulation; without one and without
+/// inverse_effective_inertia, what holds it is estimated.
 pub const ISOCOAT_LINK_CONSTRAINED: isocoat_link_flags = 2;
 /// The field inverse_effective_inertia is given.
 pub const ISOCOAT_LINK_HAS_INVERSE_EFFECTIVE_INERTIA: isocoat_link_flags = 4;
@@ -81,7 +82,8 @@ pub struct isocoat_link_desc {
     pub flags: isocoat_link_flags,
     /// Host-driven links that joints hold: the 6x6 matrix from wrench at the centre of mass (force, torque) to
     /// acceleration (linear, angular), in the world, row by row; symmetric and positive definite. Read only with
-    /// ISOCOAT_LINK_HAS_INVERSE_EFFECTIVE_INERTIA in flags. Default 0.
+    /// ISOCOAT_LINK_HAS_INVERSE_EFFECTIVE_INERTIA in flags. Where several links of the same joints touch, see
+    /// isocoat_world_set_articulations. Default 0.
     pub inverse_effective_inertia: [f64; 36],
     /// The host's own; given back, otherwise unused. Default NULL.
     pub user_data: *mut c_void,

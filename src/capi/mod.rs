@@ -2,7 +2,7 @@
 //!
 //! Mechanism and nouns are apart. Mechanism: [`status`] (codes, messages), [`version`], [`guard`] (panics, locks),
 //! [`mod@pointer`] and [`descriptor`] (memory of the host), [`handle`], [`buffer`]. Nouns: [`world`], [`body`],
-//! [`link`], [`skeleton`], [`blend`], [`spring`], [`substance`], [`particle`], [`piece`], [`math`], and what is done
+//! [`link`], [`articulation`], [`skeleton`], [`blend`], [`spring`], [`substance`], [`particle`], [`piece`], [`math`], and what is done
 //! with them: [`motion`], [`bulk`], [`report`], [`snapshot`], [`recording`], [`query`], [`rays`], [`mesh`], [`skin`],
 //! [`fit`], [`draw`], [`tasks`], [`volume`].
 //!
@@ -12,6 +12,7 @@
 // The names and the promises are those of C. What a pointer must be stands in the line of its parameter.
 #![allow(non_camel_case_types, clippy::missing_safety_doc)]
 
+pub mod articulation;
 pub mod blend;
 pub mod body;
 pub mod buffer;

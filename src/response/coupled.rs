@@ -10,6 +10,7 @@ use super::conjugate::{Block, Blocks};
 use super::envelope::{BLOCK, Envelope};
 use super::group::{Group, Member, Points, Push, Slope, relative};
 use super::grouping::Bundle;
+use super::joined::Joined;
 use super::springs::Tie;
 use crate::base::{Inertia, Motion};
 use crate::math::{Mat3, Quat, Twist, Vec3, Wrench, rotate_tensor};
@@ -26,6 +27,8 @@ pub struct Coupled {
     pub ties: Vec<Tie>,
     /// Members of all groups, then of all ties.
     pub members: Vec<Member>,
+    /// What articulations add to the inertia of the links.
+    pub joined: Joined,
     masses: Vec<Matrix6<f64>>,
     mobilities: Vec<Matrix6<f64>>,
     blocks: Vec<u32>,
@@ -64,11 +67,13 @@ struct Role {
     member: u32,
 }
 
-/// How a member of a group or a tie answers to another.
+/// A block off the diagonal.
 #[derive(Clone, Copy, Debug)]
-struct Coupling {
-    part: u32,
-    members: [u32; 2],
+enum Coupling {
+    /// How a member of a group or a tie answers to another.
+    Part { part: u32, members: [u32; 2] },
+    /// The inertia of an articulation, by the number of its entry.
+    Joined(u32),
 }
 
 /// Least parts, rows and blocks that a worker takes in one go.
@@ -95,6 +100,9 @@ const QUICK: f64 = 1e-3;
 
 /// Products of a factor beyond which conjugate gradients are quicker.
 const WIDE: usize = 100_000;
+
+/// The same with articulations, whose stiff joints take gradients many turns.
+const WIDE_JOINED: usize = 5_000_000;
 
 /// Least and most that conjugate gradients leave of a Newton step.
 const GRADIENTS: (f64, f64) = (5e-3, 1e-1);
@@ -167,6 +175,12 @@ impl Coupled {
     /// The velocities of a link in the unknowns `x`, if it has any.
     pub fn twist_in(&self, link: u32, x: &[f64]) -> Option<Twist> {
         Some(self.blocks[link as usize]).filter(|block| *block != NONE).map(|block| twist_of(x, block))
+    }
+
+    /// Whether a link is solved together with others of its articulation.
+    pub fn is_joined(&self, link: u32) -> bool {
+        let block = self.blocks[link as usize];
+        block != NONE && !self.joined.range_of(block as usize).is_empty()
     }
 
     /// What each group came to at the unknowns that [`solve`](Self::solve) found.
@@ -288,7 +302,7 @@ impl Coupled {
 
     /// Who is coupled with whom, and the shape of the matrix.
     fn shape(&mut self) {
-        let Self { groups, ties, members, blocks, roles, starts, couplings, first, .. } = self;
+        let Self { groups, ties, members, joined, blocks, roles, starts, couplings, first, .. } = self;
         let parts = groups.iter().map(|group| group.members).chain(ties.iter().map(|tie| tie.members));
         let count = self.masses.len();
         let block = |member: usize| blocks[members[member].link as usize];
@@ -321,21 +335,32 @@ impl Coupled {
                 *place += 1;
             }
         }
-        self.wide = Envelope::cost(first) > WIDE;
+        for entry in joined.entries() {
+            first[entry.row as usize] = first[entry.row as usize].min(entry.other);
+        }
+        self.wide = Envelope::cost(first) > if joined.is_empty() { WIDE } else { WIDE_JOINED };
         if !self.wide {
             self.matrix.reset(first);
         }
         let (wide, matrix) = (self.wide, &mut self.blocks_of_matrix);
+        // Of a factor the lower half.
+        let is_needed = |row: usize, other: u32| other < row as u32 || wide && other > row as u32;
         couplings.clear();
         matrix.clear();
         for row in 0..count {
             for role in &roles[starts[row] as usize..starts[row + 1] as usize] {
                 for other in taking_part(members_of(role.part as usize)) {
-                    // Of a factor the lower half.
-                    if block(other) < row as u32 || wide && block(other) > row as u32 {
-                        couplings.push(Coupling { part: role.part, members: [role.member, other as u32] });
+                    if is_needed(row, block(other)) {
+                        couplings.push(Coupling::Part { part: role.part, members: [role.member, other as u32] });
                         matrix.couple(block(other));
                     }
+                }
+            }
+            for index in joined.range_of(row) {
+                let other = joined.entries()[index].other;
+                if is_needed(row, other) {
+                    couplings.push(Coupling::Joined(index as u32));
+                    matrix.couple(other);
                 }
             }
             matrix.end_row();
@@ -362,14 +387,19 @@ impl Coupled {
             }
         });
         self.parts = parts;
-        let Self { parts, members, masses, roles, starts, couplings, diagonal, residual, .. } = self;
+        let Self { parts, members, joined, masses, roles, starts, couplings, diagonal, residual, .. } = self;
         let (parts, members, masses, roles) = (&*parts, &*members, &*masses, &*roles);
         let roles_of = |row: usize| &roles[starts[row] as usize..starts[row + 1] as usize];
         residual.resize(masses.len() * BLOCK, 0.0);
         let work_out = |row: usize, residual: &mut [f64]| {
-            let range = row * BLOCK..(row + 1) * BLOCK;
-            let change = Vector6::from_column_slice(&x[range.clone()]) - Vector6::from_column_slice(&free[range]);
-            let mut sum = masses[row] * change;
+            let change = |row: usize| {
+                let range = row * BLOCK..(row + 1) * BLOCK;
+                Vector6::from_column_slice(&x[range.clone()]) - Vector6::from_column_slice(&free[range])
+            };
+            let mut sum = masses[row] * change(row);
+            for entry in &joined.entries()[joined.range_of(row)] {
+                sum += entry.block * change(entry.other as usize);
+            }
             for role in roles_of(row) {
                 let member = &members[role.member as usize];
                 let Wrench { force, torque } = member.wrench(&parts[role.part as usize].push.all);
@@ -385,6 +415,11 @@ impl Coupled {
         team.each_row(residual, BLOCK, diagonal, |row, residual, sum| {
             work_out(row, residual);
             *sum = masses[row];
+            for entry in &joined.entries()[joined.range_of(row)] {
+                if entry.other as usize == row {
+                    *sum += entry.block;
+                }
+            }
             for role in roles_of(row) {
                 let (part, member) = (&parts[role.part as usize], &members[role.member as usize]);
                 if part.resists {
@@ -393,10 +428,12 @@ impl Coupled {
             }
         });
         let couplings = &*couplings;
-        let block = |index: usize| {
-            let Coupling { part, members: [row, other] } = couplings[index];
-            let part = &parts[part as usize];
-            part.resists.then(|| members[row as usize].block(&part.slope, &members[other as usize]) * h)
+        let block = |index: usize| match couplings[index] {
+            Coupling::Part { part, members: [row, other] } => {
+                let part = &parts[part as usize];
+                part.resists.then(|| members[row as usize].block(&part.slope, &members[other as usize]) * h)
+            }
+            Coupling::Joined(entry) => Some(joined.entries()[entry as usize].block),
         };
         if self.wide {
             let entries = self.blocks_of_matrix.entries();
@@ -411,7 +448,15 @@ impl Coupled {
         }
         for (index, coupling) in couplings.iter().enumerate() {
             if let Some(block) = block(index) {
-                let [row, other] = coupling.members.map(|member| self.blocks[members[member as usize].link as usize]);
+                let [row, other] = match coupling {
+                    Coupling::Part { members: pair, .. } => {
+                        pair.map(|member| self.blocks[members[member as usize].link as usize])
+                    }
+                    Coupling::Joined(entry) => {
+                        let entry = &joined.entries()[*entry as usize];
+                        [entry.row, entry.other]
+                    }
+                };
                 self.matrix.add(row as usize, other as usize, &block);
             }
         }

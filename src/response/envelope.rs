@@ -110,6 +110,39 @@ impl Envelope {
     }
 }
 
+impl Envelope {
+    /// The inverse of the matrix, of a factor without gaps; row by row.
+    pub fn invert(&self, inverse: &mut Vec<f64>) {
+        let size = self.diagonal.len();
+        inverse.clear();
+        inverse.resize(size * size, 0.0);
+        // The factor's inverse, each column in a row of its own, from its diagonal on.
+        for (column, lower) in inverse.chunks_exact_mut(size).enumerate() {
+            lower[column] = 1.0 / self.values[self.diagonal[column]];
+            for row in column + 1..size {
+                let diagonal = self.diagonal[row];
+                let values = &self.values[diagonal + column - row..diagonal];
+                lower[row] = -dot(values, &lower[column..row]) / self.values[diagonal];
+            }
+        }
+        // The product of its transpose with itself: below the diagonal first, where nothing stands yet.
+        for row in 1..size {
+            let (above, this) = inverse.split_at_mut(row * size);
+            let (below, own) = this[..size].split_at_mut(row);
+            for (x, other) in below.iter_mut().zip(above.chunks_exact(size)) {
+                *x = dot(&other[row..], own);
+            }
+        }
+        for row in 0..size {
+            let own = &inverse[row * size + row..(row + 1) * size];
+            inverse[row * size + row] = dot(own, own);
+            for column in row + 1..size {
+                inverse[row * size + column] = inverse[column * size + row];
+            }
+        }
+    }
+}
+
 /// In four strands, which the compiler can keep in one register; the same bits everywhere.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut strands = [0.0; 4];
@@ -237,6 +270,24 @@ mod tests {
             sorted.sort_unstable();
             prop_assert_eq!(sorted, (0..20).collect::<Vec<u32>>());
         }
+    }
+
+    #[test]
+    fn a_full_factor_gives_the_inverse() {
+        let count = 3;
+        let size = count * BLOCK;
+        let root = DMatrix::from_fn(size, size, |row, column| ((row * 7 + column * 11) % 13) as f64 - 6.0);
+        let dense = &root * root.transpose() + DMatrix::identity(size, size);
+        let mut envelope = Envelope::default();
+        envelope.reset(&vec![0; count]);
+        for (to, from) in (0..count).flat_map(|to| (0..=to).map(move |from| (to, from))) {
+            envelope.add(to, from, &dense.fixed_view::<BLOCK, BLOCK>(to * BLOCK, from * BLOCK).into_owned());
+        }
+        assert!(envelope.factor());
+        let mut inverse = Vec::new();
+        envelope.invert(&mut inverse);
+        let off = DMatrix::from_row_slice(size, size, &inverse) * dense - DMatrix::identity(size, size);
+        assert!(off.abs().max() < 1e-9, "{:e}", off.abs().max());
     }
 
     #[test]

@@ -74,6 +74,8 @@ pub struct Solver {
     /// How far apart two skeletons are that nothing in the round can bring together \[m\].
     reach: f64,
     carriers: Carriers,
+    /// Impulses that the links of articulations had before, articulation by articulation.
+    before: Vec<Wrench>,
     /// Rounds of the last step, all halves together.
     pub rounds: u32,
     /// Halvings of the last step.
@@ -145,7 +147,7 @@ pub fn step(step: &mut Step, dt: f64, effort: &Effort, solver: &mut Solver) {
         return;
     }
     solver.trial.resize(step.motions.len(), Motion::default());
-    solver.order_links(step.island, step.candidates, step.motions);
+    solver.order_links(step);
     halves(step, dt, effort, effort.splits, solver);
 }
 
@@ -171,7 +173,8 @@ fn halves(step: &mut Step, dt: f64, effort: &Effort, splits: u32, solver: &mut S
 
 impl Solver {
     /// The links with unknowns, neighbours near each other.
-    fn order_links(&mut self, island: &Island, candidates: &[Kept], motions: &[Motion]) {
+    fn order_links(&mut self, step: &Step) {
+        let Step { island, candidates, motions, .. } = step;
         let Graph { nodes, edges, order, buffers } = &mut self.graph;
         nodes.clear();
         nodes.extend(island.links.iter().filter(|link| motions[**link as usize].is_movable()));
@@ -193,11 +196,16 @@ impl Solver {
                 edges.push((a.min(b), a.max(b)));
             }
         }
+        for articulation in step.articulations_of_island() {
+            let places = || articulation.links.iter().filter_map(place);
+            edges.extend(places().flat_map(|a| places().filter(move |b| a < *b).map(move |b| (a, b))));
+        }
         edges.sort_unstable();
         edges.dedup();
         narrow_order(nodes.len(), edges, order, buffers);
         self.order.clear();
         self.order.extend(order.iter().map(|place| nodes[*place as usize]));
+        self.coupled.joined.set(&self.order, step.articulations_of_island());
     }
 
     /// Tries a step. Unless it is the `last_resort`, nothing is changed when it fails.
@@ -341,7 +349,7 @@ impl Solver {
     /// Evaluates the contacts where the velocities lead; in the `first` round, those that do not stand.
     fn look(&mut self, step: &mut Step, h: f64, first: bool) {
         self.looked.clone_from(&self.x);
-        let Step { motions, island, candidates, settings, work, team } = step;
+        let Step { motions, island, candidates, settings, work, team, .. } = step;
         for link in &island.links {
             self.trial[*link as usize] = motions[*link as usize];
         }
@@ -435,7 +443,11 @@ impl Solver {
 
     /// Moves the links by the velocities found, and hands every contact its forces.
     fn commit(&mut self, step: &mut Step, h: f64) {
-        let Step { motions, island, candidates, .. } = step;
+        self.before.clear();
+        for articulation in step.articulations_of_island() {
+            self.before.extend(articulation.links.iter().map(|link| step.motions[*link as usize].contact_impulse));
+        }
+        let Step { motions, island, candidates, articulations, .. } = step;
         for index in &island.candidates {
             let candidate = &mut candidates[*index as usize];
             candidate.loads.clear();
@@ -468,6 +480,17 @@ impl Solver {
             for member in &self.coupled.members[tie.members.0..tie.members.1] {
                 let force = force * (h * member.weight);
                 motions[member.link as usize].push(&Wrench { force, torque: member.arm.cross(&force) });
+            }
+        }
+        let mut before = self.before.iter();
+        for index in &island.articulations {
+            let articulation = &articulations[*index as usize];
+            for (from, (link, before)) in articulation.links.iter().zip(&mut before).enumerate() {
+                let mut impulse = motions[*link as usize].contact_impulse;
+                impulse.add_scaled(before, -1.0);
+                if impulse != Wrench::default() {
+                    articulation.pass_on(from, &impulse, motions, |link| self.coupled.is_joined(link));
+                }
             }
         }
         let same = |a: &Group, b: &Group| (a.candidate, a.patch) == (b.candidate, b.patch);

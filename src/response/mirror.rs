@@ -141,6 +141,14 @@ impl Mirror {
 
 /// Without the mirror: responses that end where the host's own velocities lead.
 impl Mirror {
+    /// Forgets what seems to hold the host, when it is told otherwise how the host answers pushes: an estimate is worth
+    /// nothing with another inertia.
+    pub fn forget_hold(&mut self) {
+        self.estimate = Twist::default();
+        self.bypassed = None;
+        self.doubt = 0;
+    }
+
     /// Whether the host did not do what an impulse was to bring: it is held, or pushed hard.
     pub fn is_doubtful(&self) -> bool {
         self.doubt > 0

@@ -7,6 +7,7 @@ pub mod explicit;
 pub mod group;
 pub mod grouping;
 pub mod implicit;
+pub mod joined;
 pub mod mirror;
 pub mod sharing;
 pub mod springs;

@@ -1,7 +1,7 @@
 //! One sub-step: drift, evaluate the contact surfaces, kick, drift. Symplectic, of second order, with one evaluation.
 
 use super::springs;
-use crate::base::{Motion, Spring};
+use crate::base::{Articulation, Motion, Spring};
 use crate::clock::Clock;
 use crate::contact::candidate::{Candidate, Kept};
 use crate::contact::friction;
@@ -25,6 +25,8 @@ pub struct Island {
     pub candidates: Vec<u32>,
     /// Springs between the links.
     pub springs: Vec<Spring>,
+    /// Positions in a list of articulations.
+    pub articulations: Vec<u32>,
 }
 
 /// Candidates that a worker looks at in one go.
@@ -38,6 +40,8 @@ pub struct Step<'a> {
     pub island: &'a Island,
     /// Their candidates, and maybe others.
     pub candidates: &'a mut [Kept],
+    /// Which links the host's joints hold together.
+    pub articulations: &'a [Articulation],
     /// How contact surfaces are integrated.
     pub settings: &'a Settings,
     /// Working memory.
@@ -82,10 +86,15 @@ impl Work {
 }
 
 impl Step<'_> {
+    /// The articulations of the island.
+    pub fn articulations_of_island(&self) -> impl Iterator<Item = &Articulation> + Clone {
+        self.island.articulations.iter().map(|index| &self.articulations[*index as usize])
+    }
+
     /// Advances by `h`, with the part `before` of the drift before the kick: a half for the symplectic second order, none
     /// for the force at the pose of the beginning. With `fresh`, all contact surfaces are integrated anew.
     pub fn advance(&mut self, h: f64, before: f64, fresh: bool) {
-        let Self { motions, island, candidates, settings, work, team } = self;
+        let Self { motions, island, candidates, settings, work, team, .. } = self;
         drift(motions, island, before * h);
         let mut clock = Clock::start(work.timed);
         let motions = &mut **motions;

@@ -219,6 +219,7 @@ fn check_link(link: &Link) -> Result<()> {
         substance_impulse,
         last_dt,
         mirror,
+        articulated: _,
     } = link;
     desc.validate()?;
     for (what, wrench) in [

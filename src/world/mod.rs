@@ -3,6 +3,7 @@
 //! This file holds the nouns and their life; [`step`] is the pipeline, [`query`] what can be asked in between.
 
 pub use crate::handle as arena;
+pub(crate) mod articulations;
 pub mod attributes;
 mod blend;
 mod bytes;
@@ -30,6 +31,7 @@ mod units;
 mod volume;
 
 use crate::handle::{Arena, Noun, WorldTag};
+pub use articulations::Articulation;
 pub use deformed::Deformation;
 pub use desc::{
     BodyDesc, BodyId, LinkDesc, LinkId, Response, Scheme, SkeletonDesc, SkeletonId, SpringDesc, SpringId,
@@ -42,7 +44,7 @@ pub use skin::SkinId;
 pub use springs::{Spring, SpringState};
 pub use substance::{Change, Fill, Particle, ParticleId, Piece, SubstanceDesc};
 
-use crate::base::link::Kind;
+use crate::base::{self, Kind};
 use crate::error::{Error, Result};
 use crate::field::Profile;
 use crate::math::{Pose, Quat, Wrench};
@@ -91,6 +93,8 @@ pub struct Link {
     /// Length of the last step.
     pub(crate) last_dt: f64,
     pub(crate) mirror: Mirror,
+    /// It is in an articulation.
+    pub(crate) articulated: bool,
 }
 
 impl Link {
@@ -108,6 +112,7 @@ impl Link {
             substance_impulse: Wrench::default(),
             last_dt: 0.0,
             mirror: Mirror::default(),
+            articulated: false,
         }
     }
 }
@@ -155,6 +160,7 @@ pub struct World {
     springs: Arena<Spring>,
     /// No part of snapshots.
     skins: Arena<skin::Skin>,
+    articulations: Vec<base::Articulation>,
     log: Alone<Option<Log>>,
     pair_filter: Alone<Option<PairFilter>>,
     tasks: Alone<Option<Box<dyn Tasks>>>,
@@ -179,6 +185,7 @@ impl World {
             skeletons: Arena::new(tag),
             springs: Arena::new(tag),
             skins: Arena::new(tag),
+            articulations: Vec::new(),
             log: Alone::default(),
             pair_filter: Alone::default(),
             tasks: Alone::default(),
@@ -365,6 +372,7 @@ impl World {
     }
 
     fn drop_link(&mut self, index: usize) -> Result<()> {
+        self.end_articulation_of(index as u32);
         let link = self.links.remove(self.links.id_of(index))?;
         for skeleton in link.skeletons {
             self.skeletons.remove(self.skeletons.id_of(skeleton as usize))?;
@@ -386,12 +394,19 @@ impl World {
         }
         self.check_ends(id, &desc)?;
         let link = self.links.get_mut(id)?;
-        if desc.kind != link.desc.kind {
+        let (old, new) = (link.desc.kind, desc.kind);
+        if old != new {
             link.mirror = Mirror::default();
             (link.applied_force, link.applied_impulse) = (Wrench::default(), Wrench::default());
         }
+        if desc.inverse_effective_inertia.is_some() != link.desc.inverse_effective_inertia.is_some() {
+            link.mirror.forget_hold();
+        }
         link.desc = desc;
         let body = link.body as usize;
+        if old != new || link.desc.mass == 0.0 {
+            self.end_articulation_of(id.raw.index);
+        }
         self.refresh(body);
         Ok(())
     }

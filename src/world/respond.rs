@@ -5,7 +5,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
 use super::World;
 use super::events::{Counters, LogLevel};
 use super::step::{Group, Outcome, Stepping};
-use crate::base::{Kind, Motion};
+use crate::base::{Articulation, Kind, Motion};
 use crate::contact::surface;
 use crate::contact::tally::Tally;
 use crate::math::Wrench;
@@ -39,14 +39,15 @@ pub(super) struct Worker {
 }
 
 /// How islands are stepped.
-struct Rules {
+struct Rules<'a> {
     dt: f64,
+    articulations: &'a [Articulation],
     settings: surface::Settings,
     limits: substepped::Limits,
     effort: implicit::Effort,
 }
 
-impl Rules {
+impl Rules<'_> {
     fn step(
         &self,
         group: &mut Group,
@@ -68,7 +69,8 @@ impl Rules {
         for link in supports.iter() {
             motions[*link as usize].contact_impulse = Wrench::default();
         }
-        let mut step = Step { motions, island, candidates, settings: &self.settings, work, team };
+        let articulations = self.articulations;
+        let mut step = Step { motions, island, candidates, articulations, settings: &self.settings, work, team };
         *outcome = match response {
             Response::Explicit => {
                 explicit::step(&mut step, dt);
@@ -169,8 +171,10 @@ impl Stepping {
 
 impl World {
     pub(super) fn respond(&mut self, state: &mut Stepping, dt: f64, team: &Team) {
+        let articulations = std::mem::take(&mut self.articulations);
         let rules = Rules {
             dt,
+            articulations: &articulations,
             settings: surface::Settings { scheme: self.desc.scheme, tolerance: self.desc.force_tolerance },
             limits: substepped::Limits { phase: self.desc.substep_phase, most: self.desc.max_substeps },
             effort: implicit::Effort {
@@ -192,6 +196,14 @@ impl World {
             let (response, forced) = self.choose(&state.islands[index].island, state, dt);
             (state.islands[index].response, state.islands[index].forced) = (response, forced);
         }
+        // Others than the implicit response take each link by itself.
+        for Group { island, response, .. } in &state.islands[..state.island_count] {
+            for articulation in island.articulations.iter().filter(|_| *response != Response::Implicit) {
+                for link in &articulations[*articulation as usize].links {
+                    state.motions[*link as usize].inertia = self.motion_of(&self.links[*link as usize]).inertia;
+                }
+            }
+        }
         state.hand_out_candidates();
         plan(state, &rules, team);
         for index in 0..state.island_count {
@@ -202,7 +214,7 @@ impl World {
                 group.response = Response::Implicit;
             }
             let response = group.response;
-            self.meet_hosts(state, index, response, dt);
+            self.meet_hosts(state, index, response, dt, &articulations);
         }
         for worker in &mut state.workers {
             let Worker { ready, work, .. } = unlocked(worker);
@@ -224,6 +236,7 @@ impl World {
         }
         state.collect_candidates();
         self.gather_up(state, &rules.limits);
+        self.articulations = articulations;
     }
 
     /// What the islands come to, in their order.
@@ -314,7 +327,8 @@ impl World {
             }
         }
         let held = links().any(|link| {
-            let host = link.desc.kind == Kind::Host && (link.desc.constrained || link.mirror.is_doubtful());
+            let constrained = link.desc.constrained || link.articulated;
+            let host = link.desc.kind == Kind::Host && (constrained || link.mirror.is_doubtful());
             host || self.bodies[link.body as usize].stacked > 0
         });
         let stiff = island.springs.iter().any(|spring| spring.rate2(&state.motions).sqrt() * dt > STIFF);
@@ -324,8 +338,16 @@ impl World {
         (if implicit { Response::Implicit } else { Response::Substepped }, false)
     }
 
-    /// Gives host-driven links the velocities that a response starts from.
-    fn meet_hosts(&mut self, state: &mut Stepping, index: usize, response: Response, dt: f64) {
+    /// Gives host-driven links the velocities that a response starts from. What substances did to a link of an articulation
+    /// moves the others too.
+    fn meet_hosts(
+        &mut self,
+        state: &mut Stepping,
+        index: usize,
+        response: Response,
+        dt: f64,
+        articulations: &[Articulation],
+    ) {
         for link in &state.islands[index].island.links {
             let slot = *link as usize;
             state.responses[slot] = response;
@@ -336,9 +358,25 @@ impl World {
                 let host = self.host(&self.links[slot]);
                 let link = &mut self.links[slot];
                 // With the effective inertia, the host's own answer is known; unless it turns out to be off.
-                let known = link.desc.inverse_effective_inertia.is_some();
+                let articulated = link.articulated && response == Response::Implicit;
+                let known = link.desc.inverse_effective_inertia.is_some() || articulated;
+                if articulated {
+                    // What it owes the host would be passed on to the others, of which each owes the same.
+                    link.mirror.active = false;
+                }
                 let held = link.desc.constrained && !known || link.mirror.is_doubtful();
                 link.mirror.bypass(&host, &mut state.motions[slot], held, dt);
+            }
+        }
+        if response == Response::Implicit {
+            for articulation in &state.islands[index].island.articulations {
+                let articulation = &articulations[*articulation as usize];
+                for (from, link) in articulation.links.iter().enumerate() {
+                    let impulse = state.motions[*link as usize].contact_impulse;
+                    if impulse != Wrench::default() {
+                        articulation.pass_on(from, &impulse, &mut state.motions, |_| true);
+                    }
+                }
             }
         }
     }

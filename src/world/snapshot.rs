@@ -23,7 +23,7 @@ use super::{
     Body, BodyDesc, Contact, Link, LinkDesc, LinkId, Skeleton, SkeletonDesc, SkeletonId, Spring, SpringDesc,
     StiffnessRule, World, WorldDesc, check_plane, step, units::Said,
 };
-use crate::base::Kind;
+use crate::base::{Articulation, Kind};
 use crate::contact::Scheme;
 use crate::contact::candidate::Memory;
 use crate::contact::friction::Bristle;
@@ -38,7 +38,7 @@ use crate::substance::{Bond, Particle, ParticleId, ParticleSlot, Substance, Subs
 use crate::team::Alone;
 
 /// What the lists below say. Another number is refused: no snapshot is ever half understood.
-const FORMAT: u32 = 6;
+const FORMAT: u32 = 7;
 const MAGIC: [u8; 8] = *b"isocoat\0";
 /// Offsets of the parts of the header.
 const FORMAT_AT: usize = 8;
@@ -86,8 +86,10 @@ structs! {
     Pairing { skeletons, weight, target, rate, apart }
     Link {
         desc, body, skeletons, enabled, applied_force, applied_impulse, contact_impulse, host_impulse, substance_impulse,
-        last_dt, mirror,
+        last_dt, mirror;
+        articulated: false
     }
+    Articulation { links, inverse_inertia }
     Substance { desc, particles, bonds, next_label, slots, free; changes: Vec::new() }
     SubstanceDesc {
         spacing, particle_mass, cohesion, viscosity, damping, fusion_threshold, blend_time, volume_gain, thickness, radius,
@@ -255,6 +257,7 @@ pub(super) fn read_parts(from: &mut Reader) -> Result<World> {
         skeletons: read_arena(from)?,
         springs: read_arena(from)?,
         skins: Arena::new(0),
+        articulations: Vec::new(),
         log: Alone::default(),
         pair_filter: Alone::default(),
         tasks: Alone::default(),
@@ -318,6 +321,7 @@ impl World {
             skeletons,
             springs,
             skins: _,
+            articulations,
             log: _,
             pair_filter: _,
             tasks: _,
@@ -330,6 +334,7 @@ impl World {
         write_arena(links, out, Link::write);
         write_arena(skeletons, out, Skeleton::write);
         write_arena(springs, out, Spring::write);
+        articulations.write(out);
         let (candidates, resting, contacts) = stepping.lasting();
         write_list(candidates.len(), candidates.iter().map(|candidate| candidate.lasting()), out);
         write_list(resting.len(), resting.iter(), out);
@@ -353,6 +358,7 @@ impl World {
         let mut from = open(snapshot)?;
         let origin = from.read("origin")?;
         let mut fresh = World { origin, ..read_parts(&mut from)? };
+        let articulations: Vec<Articulation> = from.read("articulations")?;
         let mut memories: Vec<Memory> = from.read("pairs of bodies")?;
         let mut resting: Vec<Memory> = from.read("pairs of bodies asleep")?;
         let mut contacts: Vec<Contact> = from.read("contacts of bodies asleep")?;
@@ -364,6 +370,12 @@ impl World {
         fresh.derive()?;
         fresh.check_memories(&memories)?;
         fresh.check_sleep(&resting, &contacts)?;
+        if articulations.iter().flat_map(|one| &one.links).any(|link| !fresh.links.is_live(*link as usize)) {
+            return Err(Error::Snapshot("an articulation of links that are not there".into()));
+        }
+        fresh
+            .check_articulations(&articulations)
+            .map_err(|(index, error)| refused(format_args!("articulation {index}"), error))?;
 
         // From here on nothing fails.
         let tag = if fresh.origin == self.origin {
@@ -391,6 +403,10 @@ impl World {
         }
         self.origin = fresh.origin;
         self.take_over(fresh);
+        for link in articulations.iter().flat_map(|one| &one.links) {
+            self.links[*link as usize].articulated = true;
+        }
+        self.articulations = articulations;
         self.stepping.restart(memories, resting, contacts);
         Ok(())
     }
@@ -418,12 +434,14 @@ impl World {
             skeletons,
             springs,
             skins: _,
+            articulations: _,
             log: _,
             pair_filter: _,
             tasks: _,
             controls_volumes: _,
             stepping: _,
         } = fresh;
+        self.articulations = Vec::new();
         self.controls_volumes = bodies.indices().any(|body| bodies[body].desc.volume_gain > 0.0);
         self.desc = desc;
         (self.bodies, self.links, self.skeletons, self.springs) = (bodies, links, skeletons, springs);

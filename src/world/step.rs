@@ -6,7 +6,7 @@ use super::events::{Contact, Counters, Event, EventKind, LogLevel, Times};
 use super::respond::{Worker, unlocked};
 use super::volume::Control;
 use super::{BodyId, Link, World, units};
-use crate::base::{Kind, Motion};
+use crate::base::{Articulation, Inertia, Kind, Motion};
 use crate::clock::Clock;
 use crate::coat::cliques::Block;
 use crate::contact::broad_phase::{self, Bounds};
@@ -272,6 +272,14 @@ impl World {
             (link.applied_force, link.applied_impulse) = (Wrench::default(), Wrench::default());
             state.motions[index] = motion;
         }
+        for articulation in &self.articulations {
+            for (place, link) in articulation.links.iter().enumerate() {
+                let motion = &mut state.motions[*link as usize];
+                if motion.is_movable() {
+                    motion.inertia = Inertia::Effective(articulation.block(place, place));
+                }
+            }
+        }
     }
 
     /// Pairs of bodies whose bounds meet and that may touch.
@@ -439,10 +447,18 @@ impl World {
                 state.roots[a.max(b) as usize] = a.min(b);
             }
         }
+        for Articulation { links, .. } in &self.articulations {
+            let bodies = || links.iter().map(|link| self.links[*link as usize].body).filter(|body| movable(*body));
+            for body in bodies().skip(1) {
+                let (a, b) = (find(&mut state.roots, body), find(&mut state.roots, bodies().next().unwrap_or(body)));
+                state.roots[a.max(b) as usize] = a.min(b);
+            }
+        }
         for group in &mut state.islands {
             group.island.links.clear();
             group.island.candidates.clear();
             group.island.springs.clear();
+            group.island.articulations.clear();
             group.supports.clear();
         }
         state.island_of.clear();
@@ -480,6 +496,13 @@ impl World {
             }
         }
         state.island_count = count;
+        for (index, Articulation { links, .. }) in self.articulations.iter().enumerate() {
+            let mut bodies = links.iter().map(|link| self.links[*link as usize].body);
+            if let Some(body) = bodies.find(|body| movable(*body) && self.bodies[*body as usize].enabled) {
+                let island = state.island_of[find(&mut state.roots, body) as usize];
+                state.islands[island as usize].island.articulations.push(index as u32);
+            }
+        }
         for Group { island, supports, .. } in &mut state.islands[..count] {
             for index in &island.candidates {
                 let candidate = &state.candidates[*index as usize];

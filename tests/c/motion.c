@@ -260,6 +260,95 @@ static void a_host_is_driven_by_impulses(void)
     isocoat_world_destroy(world);
 }
 
+/* The speed of a ball that is pushed out of a fixed one: alone with two kilograms, or with one and another ball of one
+ * kilogram that a rod ties to it. */
+static double pushed_out(int tied)
+{
+    isocoat_world_desc settings = isocoat_world_desc_default();
+    isocoat_world *world = NULL;
+    isocoat_link links[2];
+    isocoat_link_state states[2];
+    isocoat_link_desc desc = isocoat_link_desc_default();
+    isocoat_wrench impulse;
+    double matrix[144] = {0};
+    const size_t counts[1] = {2};
+    const double dt = 1.0 / 60.0, inertia = tied ? 0.004 : 0.008;
+    int i, k;
+    settings.response = ISOCOAT_RESPONSE_IMPLICIT;
+    OK(isocoat_world_create(&settings, &world));
+    (void)new_ball(world, ISOCOAT_LINK_FIXED, 0.0);
+    links[0] = new_ball(world, ISOCOAT_LINK_HOST, 0.19).link;
+    links[1] = new_ball(world, ISOCOAT_LINK_HOST, 5.0).link;
+    if (!tied) {
+        OK(isocoat_link_get_desc(world, links[0], &desc));
+        desc.mass = 2.0;
+        for (k = 0; k < 3; ++k) desc.inertia[4 * k] = inertia;
+        OK(isocoat_link_set_desc(world, links[0], &desc));
+    } else {
+        for (k = 0; k < 12; ++k) matrix[13 * k] = k % 6 < 3 ? 0.5 * (1.0 + 1e-6) : 1.0 / inertia;
+        for (k = 0; k < 3; ++k) matrix[12 * k + 6 + k] = matrix[12 * (6 + k) + k] = 0.5;
+        OK(isocoat_world_set_articulations(world, links, counts, matrix, 1));
+    }
+    for (k = 0; k < 2; ++k) OK(isocoat_link_get_state(world, links[k], &states[k]));
+    for (i = 0; i < 60; ++i) {
+        OK(isocoat_world_set_link_states(world, links, states, 2));
+        OK(isocoat_world_step(world, dt));
+        OK(isocoat_link_get_impulse(world, links[0], &impulse));
+        for (k = 0; k < 2; ++k) {
+            states[k].linear_velocity[2] += 0.5 * impulse.force[2];
+            states[k].pose.position[2] += states[k].linear_velocity[2] * dt;
+        }
+    }
+    isocoat_world_destroy(world);
+    return states[0].linear_velocity[2];
+}
+
+static void an_articulation_is_pushed_as_one(void)
+{
+    const double alone = pushed_out(0);
+    CHECK(alone > 0.05);
+    CHECK_NEAR(pushed_out(1), alone, 1e-4 * alone);
+}
+
+static void articulations_are_set_all_or_none(void)
+{
+    isocoat_world *world = new_world();
+    isocoat_link links[3];
+    size_t counts[2] = {1, 1};
+    double matrices[72] = {0};
+    const isocoat_status bad = ISOCOAT_ERROR_INVALID_ARGUMENT;
+    int i;
+    for (i = 0; i < 2; ++i) links[i] = new_ball(world, ISOCOAT_LINK_HOST, 5.0 * i).link;
+    links[2] = new_ball(world, ISOCOAT_LINK_FIXED, 10.0).link;
+    for (i = 0; i < 12; ++i) matrices[36 * (i / 6) + 7 * (i % 6)] = 1.0;
+    OK(isocoat_world_set_articulations(world, links, counts, matrices, 2));
+    OK(isocoat_world_set_articulations(world, links, counts, matrices, 1));
+    OK(isocoat_world_set_articulations(world, NULL, NULL, NULL, 0));
+
+    REFUSED(isocoat_world_set_articulations(NULL, links, counts, matrices, 2), bad, "world is NULL");
+    REFUSED(isocoat_world_set_articulations(world, NULL, counts, matrices, 2), bad, "links is NULL");
+    REFUSED(isocoat_world_set_articulations(world, links, NULL, matrices, 2), bad, "link_counts is NULL");
+    REFUSED(isocoat_world_set_articulations(world, links, counts, NULL, 2), bad, "inverse_inertias is NULL");
+    matrices[36] = -1.0;
+    REFUSED(isocoat_world_set_articulations(world, links, counts, matrices, 2), ISOCOAT_ERROR_OUT_OF_RANGE,
+            "articulations[1]: inverse_inertia is not positive definite");
+    matrices[36] = 1.0;
+    links[1] = links[0];
+    REFUSED(isocoat_world_set_articulations(world, links, counts, matrices, 2), ISOCOAT_ERROR_UNSUPPORTED,
+            "articulations[1]: a link may be named once");
+    links[1] = links[2];
+    REFUSED(isocoat_world_set_articulations(world, links, counts, matrices, 2), ISOCOAT_ERROR_UNSUPPORTED,
+            "articulations[1]: a link of an articulation must be host-driven");
+    counts[1] = 0;
+    REFUSED(isocoat_world_set_articulations(world, links, counts, matrices, 2), ISOCOAT_ERROR_OUT_OF_RANGE,
+            "articulations[1]: number of links is 0; must be from 1 to 256");
+    counts[1] = SIZE_MAX;
+    REFUSED(isocoat_world_set_articulations(world, links, counts, matrices, 2), bad, "no memory is that large");
+    counts[1] = (size_t)1 << (4 * sizeof(size_t) - 1);
+    REFUSED(isocoat_world_set_articulations(world, links, counts, matrices, 2), bad, "no memory is that large");
+    isocoat_world_destroy(world);
+}
+
 int main(void)
 {
     a_free_link_falls_and_is_pushed();
@@ -267,5 +356,7 @@ int main(void)
     bulk_calls_agree_with_single_ones();
     a_bulk_call_is_done_whole_or_not_at_all();
     a_host_is_driven_by_impulses();
+    an_articulation_is_pushed_as_one();
+    articulations_are_set_all_or_none();
     return verdict("motion");
 }

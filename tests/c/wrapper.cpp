@@ -209,6 +209,13 @@ static void motion()
     world.get_link_wrenches(links, isocoat::buffer(force.data()), {});
     world.get_link_impulses(links, {}, isocoat::buffer(force.data()));
     CHECK(position[0] == 5.0f && position[1] == 6.0f && force[2] == 0.0);
+    world.set_articulations({}, {}, {});
+    try {
+        world.set_articulations(links, {}, {});
+        CHECK(false);
+    } catch (const isocoat::error &error) {
+        CHECK(error.status() == ISOCOAT_ERROR_INVALID_ARGUMENT);
+    }
     states.clear();
     try {
         world.set_link_states(links, states);

@@ -1,6 +1,5 @@
 // A pendulum of coated links that swings against a wall, and a ball that spins on a floor, under Bullet: one parameter
-// at a time, far beyond what is usual, under each response. With the argument "table" all rows, as Markdown for
-// docs/extremes.md; otherwise a few, as checks.
+// at a time, far beyond what is usual, under each response; with the argument "table" as Markdown for docs/extremes.md.
 #include <cstring>
 #include <string>
 
@@ -131,15 +130,17 @@ outcome spinning_ball(const knobs &set, isocoat_response response) {
 
 void row(const char *scene_name, const char *parameter, double value, const response_kind &kind, const outcome &result) {
     // The drift of the host's own joints counts too.
-    const bool passes = result.finite && result.gain <= 0.01 && result.escaped <= 0;
+    const double most = kind.response == ISOCOAT_RESPONSE_IMPLICIT ? 1e-3 : 1e-2;
+    const bool sound = result.finite && result.escaped <= 0, passes = sound && result.gain <= most;
     if (as_table) {
         std::printf("| %s | %s | %.2g | %s | %s | %.1e | %s | %.1e | %s |\n", scene_name, parameter, value, kind.name,
                     result.finite ? "true" : "false", result.gain, result.escaped > 0 ? "true" : "false", result.speed,
                     passes ? "" : "**fails**");
         return;
     }
-    // Forced sub-steps know nothing of joints: the table says where they fail.
-    expect(passes || kind.response == ISOCOAT_RESPONSE_SUBSTEPPED, "%s, %s %.2g, %s: gain %.1e, %.1e m/s at the end",
+    // Forced sub-steps know nothing of joints: 3 % is what all their bounces may add up to.
+    const bool bounces = kind.response == ISOCOAT_RESPONSE_SUBSTEPPED && sound && result.gain <= 3e-2;
+    expect(passes || bounces, "%s, %s %.2g, %s: gain %.1e, %.1e m/s at the end",
            scene_name, parameter, value, kind.name, result.gain, result.speed);
 }
 
@@ -162,19 +163,19 @@ int main(int count, char **arguments) {
     if (as_table) {
         std::printf("\n### Under Bullet (%s precision)\n\n"
                     "A pendulum of three links on hinges at a wall, 10 s, and a spinning ball that falls on a floor, 5 s. "
-                    "`gain` is the rise of the highest energy from one second to the next, and may be 1 %%: Bullet's joints drift. "
+                    "`gain` is the rise of the highest energy from one second to the next, and may be 0.1 %% under the implicit "
+                    "response, 1 %% under others. "
                     "Bullet turns no body by more than a quarter turn a tick.\n\n"
                     "| scene | parameter | value | response | finite | gain | escaped | m/s at the end | |\n"
                     "| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
                     precision);
-        sweep("pendulum", pendulum, "contact modulus [Pa]", &knobs::modulus, {1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9});
-        sweep("pendulum", pendulum, "tick [s]", &knobs::tick, {1.0 / 15, 1.0 / 30, 1.0 / 60, 1.0 / 240, 1.0 / 1000});
-        sweep("pendulum", pendulum, "mass of the last link [kg]", &knobs::mass_ratio, {1e-3, 1e-2, 0.1, 1, 10, 100});
-        sweep("spinning ball", spinning_ball, "spin [rad/s]", &knobs::spin, {1, 10, 94, 1000});
+    }
+    sweep("pendulum", pendulum, "contact modulus [Pa]", &knobs::modulus, {1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9});
+    sweep("pendulum", pendulum, "tick [s]", &knobs::tick, {1.0 / 15, 1.0 / 30, 1.0 / 60, 1.0 / 240, 1.0 / 1000});
+    sweep("pendulum", pendulum, "mass of the last link [kg]", &knobs::mass_ratio, {1e-3, 1e-2, 0.1, 1, 10, 100});
+    sweep("spinning ball", spinning_ball, "spin [rad/s]", &knobs::spin, {1, 10, 94, 1000});
+    if (as_table) {
         return 0;
     }
-    sweep("pendulum", pendulum, "contact modulus [Pa]", &knobs::modulus, {1e4, 1e9});
-    sweep("pendulum", pendulum, "tick [s]", &knobs::tick, {1.0 / 30, 1.0 / 240});
-    sweep("spinning ball", spinning_ball, "spin [rad/s]", &knobs::spin, {94});
     return summary("extremes");
 }

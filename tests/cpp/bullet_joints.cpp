@@ -147,10 +147,64 @@ void figure(int ticks) {
 
 }  // namespace
 
+/// A ball on an arm rests on the floor and is hit: it does not fly off with more than it got.
+void blow(int ticks, double speed) {
+    const material made_of{1e6, 0.5, 0.1};
+    scene world;
+    world.add_floor(made_of);
+    btRigidBody *ball = world.add_ball(btVector3(0, btScalar(0.495), 0), made_of);
+    ball->setActivationState(DISABLE_DEACTIVATION);
+    btHingeConstraint hinge(*ball, btVector3(-2, 0, 0), btVector3(0, 0, 1));
+    world.dynamics->addConstraint(&hinge);
+    world.frames(120, ticks);
+    const double rest = double(ball->getCenterOfMassPosition().y());
+    ball->applyCentralImpulse(btVector3(0, btScalar(-speed), 0));
+    double top = 0;
+    for (int i = 0; i < 90; ++i) {
+        world.frame(ticks);
+        top = std::max(top, double(ball->getCenterOfMassPosition().y()) - rest);
+    }
+    const double given = 0.5 * speed * speed / gravity;
+    expect(top < given, "a ball on an arm, hit down at %.0f m/s, %d tick(s), rises by %.3f m, of %.3f at most", speed, ticks,
+           top, given);
+    world.dynamics->removeConstraint(&hinge);
+}
+
+/// Bodies that may not turn, or have no inertia, hang on joints as others do.
+void upright(bool factor) {
+    scene world;
+    world.add_floor();
+    btRigidBody *post = world.add_ball(btVector3(0, btScalar(0.495), 0));
+    if (factor) {
+        post->setAngularFactor(0);
+    } else {
+        post->setMassProps(1, btVector3(0, 0, 0));
+    }
+    post->setActivationState(DISABLE_DEACTIVATION);
+    world.coupler->refresh(post);
+    btRigidBody *load = world.add_body(4, btVector3(0, 2, 0), std::make_unique<btSphereShape>(btScalar(0.2)), true);
+    load->setActivationState(DISABLE_DEACTIVATION);
+    const btVector3 at(0, btScalar(0.495), 0);
+    const btTransform in_post(btQuaternion::getIdentity(), at - post->getCenterOfMassPosition());
+    const btTransform in_load(btQuaternion::getIdentity(), at - load->getCenterOfMassPosition());
+    btFixedConstraint joint(*post, *load, in_post, in_load);
+    world.dynamics->addConstraint(&joint, true);
+    world.frames(240);
+    const double height = double(load->getCenterOfMassPosition().y());
+    expect(world.coupler->last_error().empty() && height > 1.9 && post->getLinearVelocity().length() < 1,
+           "a load on a post %s stands at %.3f m; %s", factor ? "that may not turn" : "without inertia", height,
+           world.coupler->last_error().c_str());
+    world.dynamics->removeConstraint(&joint);
+}
+
 int main() {
     for (const int ticks : {1, 4}) {
         arms(ticks);
         figure(ticks);
+        blow(ticks, 1);
+        blow(ticks, 5);
     }
+    upright(true);
+    upright(false);
     return summary("joints");
 }
