@@ -511,10 +511,8 @@ private:
             if (jointed && !entry.asleep) {
                 foresee(entry, one->acceleration, dt);
                 (void)tell_acceleration(entry, entry.acceleration);
-            } else if (!jointed) {
-                if (entry.jointed) {
-                    (void)tell_acceleration(entry, detail::six(entry.expected));
-                }
+            } else if (!jointed && entry.jointed) {
+                (void)tell_acceleration(entry, detail::six(entry.expected));
             }
             entry.before = own_doing(entry, dt);
             entry.jointed = jointed;

@@ -792,7 +792,8 @@ typedef uint32_t isocoat_link_flags;
 #define ISOCOAT_LINK_HOST_GYROSCOPIC 1u
 /**
  * Joints or contacts of the host act on the link in this tick, so that it does not move as its own mass would. The
- * automatic response is implicit then; without inverse_effective_inertia, what holds it is estimated.
+ * automatic response is implicit then, as it is for links of an articulation; without one and without
+ * inverse_effective_inertia, what holds it is estimated.
  */
 #define ISOCOAT_LINK_CONSTRAINED 2u
 /** The field inverse_effective_inertia is given. */

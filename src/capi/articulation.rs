@@ -50,11 +50,8 @@ pub unsafe extern "C" fn isocoat_world_set_articulations(
             for (index, count) in counts.iter().enumerate() {
                 check_count(*count).map_err(|error| Refusal::from(error).at("articulations", index))?;
             }
-            let sizes = counts.iter().map(|count| Some((*count, count.checked_mul(6)?.checked_pow(2)?)));
-            let all = sizes.reduce(|sum, size| Some((sum?.0.checked_add(size?.0)?, sum?.1.checked_add(size?.1)?)));
-            let Some((all_links, all_numbers)) = all.unwrap_or(Some((0, 0))) else {
-                return Err(Refusal::argument("link_counts: no memory is that large"));
-            };
+            let sum = |(links, numbers), count: &usize| (links + count, numbers + 36 * count * count);
+            let (all_links, all_numbers) = counts.iter().fold((0, 0), sum);
             let links: Vec<LinkId> = Array::new(links, all_links, "links")?.iter().map(Into::into).collect();
             let numbers = pointer::slice(inverse_inertias, all_numbers, "inverse_inertias")?;
             let (mut links, mut numbers) = (&links[..], numbers);
