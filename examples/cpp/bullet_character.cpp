@@ -33,7 +33,7 @@ int main(int argc, char **argv) {
         recording film;
         if (record_begin(&film, record_argument(&argc, argv))) throw std::runtime_error("cannot record");
         const bool chosen = argc > 2 && std::string(argv[1]) == "--push";
-        character::fall scene(chosen ? std::stod(argv[2]) : 34.0);
+        character::fall scene(chosen ? std::stod(argv[2]) : 40.0);
         isocoat_times spent{};
         const picture_view view = {{3.2, -5.2, 2.9}, {0.6, 0.0, 0.6}, {0, 0, 1}, 4.2};
         int most = 0, pictures = 0;

@@ -21,7 +21,7 @@ inline btVector3 bullet(const isocoat::vec3 &v) { return btVector3(btScalar(v[0]
 class fall {
 public:
     /// The push at its shoulders [N s] decides how it comes to lie.
-    explicit fall(double push = 40.0, double tick = 1.0 / 60.0)
+    explicit fall(double push, double tick = 1.0 / 60.0)
         : coats(settings()), tick_(tick), coupler_(coats.get(), &dynamics_) {
         dynamics_.setGravity(btVector3(0, 0, btScalar(-9.81)));
         dynamics_.addAction(&coupler_);
