@@ -216,7 +216,7 @@ fn an_articulation_ends() {
     }
 }
 
-/// Links that nobody pushes are moved by those that are: what comes out for each says so in the next step.
+/// What is said holds in the world that takes the snapshot up.
 #[test]
 fn a_snapshot_keeps_articulations() {
     let mut table = Table::new(Parts::Articulated);

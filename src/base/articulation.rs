@@ -1,8 +1,8 @@
 //! Articulations: links of a host that its joints hold together, so that a push on one moves all of them.
 
-use nalgebra::{Matrix6, Vector6};
+use nalgebra::Matrix6;
 
-use super::Motion;
+use super::motion::{Inertia, Motion, answer};
 use crate::math::{Twist, Wrench};
 
 /// Numbers of a link's twist or wrench.
@@ -25,22 +25,25 @@ impl Articulation {
         Matrix6::from_fn(|row, column| self.inverse_inertia[(SIX * to + row) * width + SIX * from + column])
     }
 
+    /// Gives those that can move the inertia that they have while nobody pushes the others.
+    pub fn set_inertias(&self, motions: &mut [Motion]) {
+        for (place, link) in self.links.iter().enumerate() {
+            let motion = &mut motions[*link as usize];
+            if motion.is_movable() {
+                motion.inertia = Inertia::Effective(self.block(place, place));
+            }
+        }
+    }
+
     /// Moves the others, as far as `moves` says of their slots, by an impulse on the link at `from`.
     pub fn pass_on(&self, from: usize, impulse: &Wrench, motions: &mut [Motion], moves: impl Fn(u32) -> bool) {
         for (to, link) in self.links.iter().enumerate() {
             if to != from && motions[*link as usize].is_movable() && moves(*link) {
-                let Twist { linear, angular } = self.answer(to, from, impulse);
+                let Twist { linear, angular } = answer(&self.block(to, from), impulse);
                 let twist = &mut motions[*link as usize].twist;
                 twist.linear += linear;
                 twist.angular += angular;
             }
         }
-    }
-
-    /// Change of the velocities of the link at `to` by an impulse on the one at `from`.
-    pub fn answer(&self, to: usize, from: usize, impulse: &Wrench) -> Twist {
-        let Wrench { force: f, torque: t } = impulse;
-        let answer = self.block(to, from) * Vector6::new(f.x, f.y, f.z, t.x, t.y, t.z);
-        Twist { linear: answer.fixed_rows::<3>(0).into_owned(), angular: answer.fixed_rows::<3>(3).into_owned() }
     }
 }

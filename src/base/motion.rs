@@ -120,14 +120,7 @@ impl Motion {
             Inertia::Solid { inverse_mass, inverse, .. } => {
                 Twist { linear: impulse.force * *inverse_mass, angular: inverse * impulse.torque }
             }
-            Inertia::Effective(matrix) => {
-                let (f, t) = (&impulse.force, &impulse.torque);
-                let answer = matrix * Vector6::new(f.x, f.y, f.z, t.x, t.y, t.z);
-                Twist {
-                    linear: answer.fixed_rows::<3>(0).into_owned(),
-                    angular: answer.fixed_rows::<3>(3).into_owned(),
-                }
-            }
+            Inertia::Effective(matrix) => answer(matrix, impulse),
         }
     }
 
@@ -183,6 +176,13 @@ impl Motion {
             Inertia::Effective(matrix) => matrix.fixed_view::<3, 3>(0, 0).trace(),
         }
     }
+}
+
+/// A matrix from impulses to velocities times an impulse.
+pub(super) fn answer(matrix: &Matrix6<f64>, impulse: &Wrench) -> Twist {
+    let Wrench { force: f, torque: t } = impulse;
+    let answer = matrix * Vector6::new(f.x, f.y, f.z, t.x, t.y, t.z);
+    Twist { linear: answer.fixed_rows::<3>(0).into_owned(), angular: answer.fixed_rows::<3>(3).into_owned() }
 }
 
 #[cfg(test)]

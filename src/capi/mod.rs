@@ -2,9 +2,9 @@
 //!
 //! Mechanism and nouns are apart. Mechanism: [`status`] (codes, messages), [`version`], [`guard`] (panics, locks),
 //! [`mod@pointer`] and [`descriptor`] (memory of the host), [`handle`], [`buffer`]. Nouns: [`world`], [`body`],
-//! [`link`], [`articulation`], [`skeleton`], [`blend`], [`spring`], [`substance`], [`particle`], [`piece`], [`math`], and what is done
-//! with them: [`motion`], [`bulk`], [`report`], [`snapshot`], [`recording`], [`query`], [`rays`], [`mesh`], [`skin`],
-//! [`fit`], [`draw`], [`tasks`], [`volume`].
+//! [`link`], [`articulation`], [`skeleton`], [`blend`], [`spring`], [`substance`], [`particle`], [`piece`], [`math`], and
+//! what is done with them: [`motion`], [`bulk`], [`report`], [`snapshot`], [`recording`], [`query`], [`rays`], [`mesh`],
+//! [`skin`], [`fit`], [`draw`], [`tasks`], [`volume`].
 //!
 //! Nothing here computes: every function checks the host's pointers, translates, calls the public Rust API, and
 //! translates back. The comments are the manual that goes into the header.

@@ -111,6 +111,16 @@ impl Envelope {
 }
 
 impl Envelope {
+    /// Sets a matrix without gaps, by its blocks on and below the diagonal.
+    pub fn fill(&mut self, count: usize, block: impl Fn(usize, usize) -> Matrix6<f64>) {
+        self.reset(&vec![0; count]);
+        for row in 0..count {
+            for column in 0..=row {
+                self.add(row, column, &block(row, column));
+            }
+        }
+    }
+
     /// The inverse of the matrix, of a factor without gaps; row by row.
     pub fn invert(&self, inverse: &mut Vec<f64>) {
         let size = self.diagonal.len();
@@ -279,10 +289,7 @@ mod tests {
         let root = DMatrix::from_fn(size, size, |row, column| ((row * 7 + column * 11) % 13) as f64 - 6.0);
         let dense = &root * root.transpose() + DMatrix::identity(size, size);
         let mut envelope = Envelope::default();
-        envelope.reset(&vec![0; count]);
-        for (to, from) in (0..count).flat_map(|to| (0..=to).map(move |from| (to, from))) {
-            envelope.add(to, from, &dense.fixed_view::<BLOCK, BLOCK>(to * BLOCK, from * BLOCK).into_owned());
-        }
+        envelope.fill(count, |row, column| dense.fixed_view::<BLOCK, BLOCK>(row * BLOCK, column * BLOCK).into_owned());
         assert!(envelope.factor());
         let mut inverse = Vec::new();
         envelope.invert(&mut inverse);

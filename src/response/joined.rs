@@ -15,7 +15,6 @@ pub struct Joined {
     starts: Vec<u32>,
     members: Vec<Joint>,
     matrix: Envelope,
-    shape: Vec<u32>,
     inverse: Vec<f64>,
 }
 
@@ -61,16 +60,9 @@ impl Joined {
     }
 
     fn add(&mut self, articulation: &Articulation) {
-        let Self { entries, members, matrix, shape, inverse, .. } = self;
+        let Self { entries, members, matrix, inverse, .. } = self;
         let count = members.len();
-        shape.clear();
-        shape.resize(count, 0);
-        matrix.reset(shape);
-        for (i, to) in members.iter().enumerate() {
-            for (j, from) in members[..=i].iter().enumerate() {
-                matrix.add(i, j, &articulation.block(to.place, from.place));
-            }
-        }
+        matrix.fill(count, |i, j| articulation.block(members[i].place, members[j].place));
         // Positive definite it is, as its whole was; what rounding makes of it must not stop the step.
         if !matrix.factor() {
             return;

@@ -168,6 +168,11 @@ impl Mirror {
         })
     }
 
+    /// Goes on from the host's own velocities.
+    pub fn let_go(&mut self) {
+        self.active = false;
+    }
+
     /// Sets the velocities of a motion that [`enter`](Self::enter) has prepared to those from which the host itself
     /// starts. Of a mirror in use the velocities are taken over; the host is told the difference. Of a `held` host, what
     /// holds it is estimated from how far it was off.

@@ -25,7 +25,8 @@ const SKEW: f64 = 1e-6;
 
 impl World {
     /// Says which host-driven links move each other through joints, and how, in place of all that was said before; it
-    /// holds until it is said anew, or one of an articulation's links is destroyed. None is changed when one is refused.
+    /// holds until it is said anew, or one of an articulation's links is destroyed,
+    /// changes its kind or loses its mass. None is changed when one is refused.
     ///
     /// The implicit response solves their contacts together, so that links that joints hold touch anything in any number
     /// without an estimate of what holds them; other responses take each link by itself. The host's joints must pass on
@@ -125,11 +126,6 @@ fn check_inertia(articulation: &base::Articulation) -> Result<()> {
         }
     }
     let mut matrix = Envelope::default();
-    matrix.reset(&vec![0; articulation.links.len()]);
-    for to in 0..articulation.links.len() {
-        for from in 0..=to {
-            matrix.add(to, from, &articulation.block(to, from));
-        }
-    }
+    matrix.fill(articulation.links.len(), |to, from| articulation.block(to, from));
     if matrix.factor() { Ok(()) } else { refuse("not positive definite".into()) }
 }

@@ -212,6 +212,9 @@ impl World {
             if group.response == Response::Substepped && group.substeps > f64::from(rules.limits.most) && !group.forced
             {
                 group.response = Response::Implicit;
+                for articulation in &group.island.articulations {
+                    articulations[*articulation as usize].set_inertias(&mut state.motions);
+                }
             }
             let response = group.response;
             self.meet_hosts(state, index, response, dt, &articulations);
@@ -362,7 +365,7 @@ impl World {
                 let known = link.desc.inverse_effective_inertia.is_some() || articulated;
                 if articulated {
                     // What it owes the host would be passed on to the others, of which each owes the same.
-                    link.mirror.active = false;
+                    link.mirror.let_go();
                 }
                 let held = link.desc.constrained && !known || link.mirror.is_doubtful();
                 link.mirror.bypass(&host, &mut state.motions[slot], held, dt);

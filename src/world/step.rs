@@ -6,7 +6,7 @@ use super::events::{Contact, Counters, Event, EventKind, LogLevel, Times};
 use super::respond::{Worker, unlocked};
 use super::volume::Control;
 use super::{BodyId, Link, World, units};
-use crate::base::{Articulation, Inertia, Kind, Motion};
+use crate::base::{Articulation, Kind, Motion};
 use crate::clock::Clock;
 use crate::coat::cliques::Block;
 use crate::contact::broad_phase::{self, Bounds};
@@ -273,12 +273,7 @@ impl World {
             state.motions[index] = motion;
         }
         for articulation in &self.articulations {
-            for (place, link) in articulation.links.iter().enumerate() {
-                let motion = &mut state.motions[*link as usize];
-                if motion.is_movable() {
-                    motion.inertia = Inertia::Effective(articulation.block(place, place));
-                }
-            }
+            articulation.set_inertias(&mut state.motions);
         }
     }
 
@@ -448,9 +443,10 @@ impl World {
             }
         }
         for Articulation { links, .. } in &self.articulations {
-            let bodies = || links.iter().map(|link| self.links[*link as usize].body).filter(|body| movable(*body));
-            for body in bodies().skip(1) {
-                let (a, b) = (find(&mut state.roots, body), find(&mut state.roots, bodies().next().unwrap_or(body)));
+            let mut bodies = links.iter().map(|link| self.links[*link as usize].body).filter(|body| movable(*body));
+            let Some(first) = bodies.next() else { continue };
+            for body in bodies {
+                let (a, b) = (find(&mut state.roots, first), find(&mut state.roots, body));
                 state.roots[a.max(b) as usize] = a.min(b);
             }
         }
