@@ -150,7 +150,7 @@ public:
             tick(dt);
         } catch (const std::exception &error) {
             for (attachment &entry : entries_) {
-                entry.follows = 0;
+                entry.forecast.forget();
             }
             report(error.what());
         }
@@ -230,16 +230,9 @@ private:
         detail::motion told;
         /// Accelerations as isocoat was told.
         detail::motion expected;
-        /// isocoat was told how the body answers pushes with its joints, and what they let it do, as an acceleration.
+        /// isocoat was told how the body answers pushes with its joints.
         bool jointed = false;
-        detail::vector6 acceleration{};
-        /// Velocities with which it went into the last tick, what it did by itself in the tick before that, and for how
-        /// many ticks this is known. What has been missing, and by how much it was off in the last tick. Accelerations.
-        detail::vector6 left{};
-        detail::vector6 before{};
-        unsigned follows = 0;
-        detail::vector6 missing{};
-        detail::vector6 off{};
+        detail::forecast forecast;
         /// For how many ticks it counts as touching still.
         int touching = 0;
         /// Sleeping bodies: what gravity and contacts usually add to the velocities in a tick; what came beyond.
@@ -256,10 +249,6 @@ private:
 
     /// A contact that rattles comes and goes from tick to tick: a body counts as held for some ticks more.
     static constexpr int held_ticks = 6;
-
-    /// Part of what was missing in a tick that goes into the estimate of it: stable while a body answers a push at
-    /// least that part as readily as isocoat is told.
-    static constexpr double learned = 0.3;
 
     std::size_t find(const btRigidBody *body) const {
         const auto found = of_body_.find(body);
@@ -398,7 +387,7 @@ private:
                 // A link that is gone shows in push_states.
                 (void)(isocoat_link_teleport(world_, entry.link, &state) == ISOCOAT_OK);
                 entry.touching = entry.jumped ? 0 : entry.touching;
-                entry.follows = 0;
+                entry.forecast.forget();
                 entry.jumped = false;
             }
             links_.push_back(entry.link);
@@ -507,14 +496,13 @@ private:
         for (const std::size_t i : movers_) {
             attachment &entry = entries_[i];
             const detail::joints::member *one = joints_.of(entry.body);
+            entry.forecast.arrive(detail::six(entry.told), dt);
             const bool jointed = one != nullptr && one->solved;
             if (jointed && !entry.asleep) {
-                foresee(entry, one->acceleration, dt);
-                (void)tell_acceleration(entry, entry.acceleration);
+                (void)tell_acceleration(entry, entry.forecast.of(one->acceleration, entry.jointed));
             } else if (!jointed && entry.jointed) {
                 (void)tell_acceleration(entry, detail::six(entry.expected));
             }
-            entry.before = own_doing(entry, dt);
             entry.jointed = jointed;
         }
         for (const detail::joints::articulation &one : joints_.articulations()) {
@@ -532,31 +520,6 @@ private:
             report("isocoat: how bodies on joints answer pushes is refused: " + detail::last_error());
             // What was said in the last tick is no longer so.
             (void)(isocoat_world_set_articulations(world_, nullptr, nullptr, nullptr, 0) == ISOCOAT_OK);
-        }
-    }
-
-    /// What a body did in the last tick by itself, as an acceleration.
-    static detail::vector6 own_doing(const attachment &entry, btScalar dt) {
-        detail::vector6 was = detail::six(entry.told);
-        for (std::size_t i = 0; i < 6; ++i) {
-            was[i] = (was[i] - entry.left[i]) / double(dt);
-        }
-        return was;
-    }
-
-    /// Works out what a body on joints is going to do without pushes: what the rows say, and what has been missing in
-    /// them. Bullet solves joints in a few iterations, and limits or contacts of its own may hold the body as well. What
-    /// was off for one tick only was a push of the host's.
-    static void foresee(attachment &entry, const detail::vector6 &rows, btScalar dt) {
-        const detail::vector6 was = own_doing(entry, dt);
-        for (std::size_t i = 0; i < 6; ++i) {
-            const double off = was[i] - (entry.jointed ? entry.acceleration[i] : rows[i]);
-            const double before = entry.jointed ? entry.off[i] : entry.before[i] - rows[i];
-            const bool lasts = entry.follows > 1 && off * before > 0.0;
-            const double lasting = lasts ? std::copysign(std::min(std::abs(off), std::abs(before)), off) : 0.0;
-            entry.missing[i] = entry.jointed ? entry.missing[i] + learned * lasting : lasting;
-            entry.off[i] = off;
-            entry.acceleration[i] = rows[i] + entry.missing[i];
         }
     }
 
@@ -676,8 +639,8 @@ private:
         joints_.pass_on(*dynamics_, dt);
         for (const std::size_t i : movers_) {
             const btRigidBody &body = *entries_[i].body;
-            entries_[i].left = detail::six(detail::motion{body.getLinearVelocity(), body.getAngularVelocity()});
-            ++entries_[i].follows;
+            const detail::motion now{body.getLinearVelocity(), body.getAngularVelocity()};
+            entries_[i].forecast.leave(detail::six(now));
         }
     }
 

@@ -3,19 +3,19 @@
 //
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //
-// The rows of all enabled constraints of an island, J u = r - C l with impulses l, are those that Bullet's solver is about
-// to get: the constraints are asked for them at the poses in which the tick begins. With the inverse masses W, and
-// S = J W J^T + C, pushes on the bodies change their velocities by A = W - W J^T S^-1 J W. isocoat gets A of those
+// The rows of all enabled constraints of an island, J u = r - C l with impulses l, are those that Bullet's solver is
+// about to get: the constraints are asked for them at the poses in which the tick begins. With the inverse masses W,
+// and S = J W J^T + C, pushes on the bodies change their velocities by A = W - W J^T S^-1 J W. isocoat gets A of those
 // bodies that touch as an articulation.
 //
 // What contacts push is passed on to the whole island by the same rows, so that its bodies' velocities still keep to
 // them. Bullet's solver alone would stop short of that: a light body between heavy ones takes more iterations than any
 // host gives, and would fly off with a push that was meant for all of them.
 //
-// Rows with bounds or that give way are left to Bullet: limits, motors, brakes. Which of them are at work, and how hard, is seen only when
-// its solver has run, and a limit that seems to hold for a tick too long throws the body off. Left to it are also
-// constraints that may break or are asked for their impulses, which must show all that they carry. What these do to a
-// body is estimated.
+// Rows with bounds or that give way are left to Bullet: limits, motors, brakes. Which of them are at work, and how
+// hard, is seen only when its solver has run, and a limit that seems to hold for a tick too long throws the body off.
+// Left to it are also constraints that may break or are asked for their impulses, which must show all that they carry.
+// What these do to a body is estimated.
 #ifndef ISOCOAT_BULLET_JOINTS_HPP
 #define ISOCOAT_BULLET_JOINTS_HPP
 
@@ -74,7 +74,8 @@ inline matrix6 lone_mobility(const btRigidBody &body) {
     return out;
 }
 
-/// What of a body's mobility joints leave it at least, on the diagonal: of the mass and inertia that it has or would have.
+/// What of a body's mobility joints leave it at least, on the diagonal: of the mass and inertia that it has or would
+/// have.
 inline vector6 least_mobility(const btRigidBody &body, double part) {
     const btVector3 &turning = body.getInvInertiaDiagLocal();
     const double linear = part * double(body.getInvMass());
@@ -82,6 +83,55 @@ inline vector6 least_mobility(const btRigidBody &body, double part) {
     const double angular = most > 0.0 ? part * most : linear;
     return {linear, linear, linear, angular, angular, angular};
 }
+
+/// What a body on joints is going to do without pushes: what the rows say, and what has been missing in them. Bullet
+/// solves joints in a few iterations, and limits or contacts of its own may hold the body as well. What was off for one
+/// tick only was a push of the host's.
+class forecast {
+public:
+    /// The last tick says nothing of the next.
+    void forget() { follows_ = 0; }
+
+    /// The velocities with which the body comes out of a tick.
+    void arrive(const vector6 &velocity, btScalar dt) {
+        before_ = was_;
+        for (std::size_t i = 0; i < 6; ++i) {
+            was_[i] = (velocity[i] - left_[i]) / double(dt);
+        }
+    }
+
+    /// Its acceleration in the next tick; `known` if the last one was foreseen as well.
+    const vector6 &of(const vector6 &rows, bool known) {
+        for (std::size_t i = 0; i < 6; ++i) {
+            const double off = was_[i] - (known ? acceleration_[i] : rows[i]);
+            const double before = known ? off_[i] : before_[i] - rows[i];
+            const bool lasts = follows_ > 1 && off * before > 0.0;
+            const double lasting = lasts ? std::copysign(std::min(std::abs(off), std::abs(before)), off) : 0.0;
+            missing_[i] = known ? missing_[i] + learned * lasting : lasting;
+            off_[i] = off;
+            acceleration_[i] = rows[i] + missing_[i];
+        }
+        return acceleration_;
+    }
+
+    /// The velocities with which it goes into the next tick.
+    void leave(const vector6 &velocity) {
+        left_ = velocity;
+        ++follows_;
+    }
+
+private:
+    /// Part of what was missing that goes into the estimate of it: stable while a body answers a push at least that
+    /// part as readily as isocoat is told.
+    static constexpr double learned = 0.3;
+
+    vector6 left_{};
+    /// For how many ticks it is known with what it left.
+    unsigned follows_ = 0;
+    /// What it did by itself in the last tick, and in the one before that.
+    vector6 was_{}, before_{};
+    vector6 acceleration_{}, missing_{}, off_{};
+};
 
 /// Dynamic bodies on constraints, island by island.
 class joints {
@@ -219,14 +269,15 @@ private:
     /// Bodies that may touch at once in an island: the matrix of an articulation is full as well.
     static constexpr std::size_t most_members = 64;
 
-    /// Softness of a row, over what it would be by itself, from which on it is left to Bullet: its solver would give in to
-    /// what is passed on once more.
+    /// Softness of a row, over what it would be by itself, from which on it is left to Bullet: its solver would give in
+    /// to what is passed on once more.
     static constexpr double soft = 1e-3;
 
     /// Softness of every row, as a part of what it would be by itself: rows that say the same twice leave it solvable.
     static constexpr double little = 1e-7;
 
-    /// Part of a body's own inverse inertia that its joints leave it in every direction: otherwise none is left in some.
+    /// Part of a body's own inverse inertia that its joints leave it in every direction: otherwise none is left in
+    /// some.
     static constexpr double left_over = 1e-6;
 
     struct joint {
@@ -341,10 +392,11 @@ private:
                     made.jacobian[end][3 + k] = double(from[8 * end + 4 + k]);
                 }
                 if (made.ends[end] == nobody) {
-                    const btRigidBody &body = end == 0 ? of.constraint->getRigidBodyA() : of.constraint->getRigidBodyB();
+                    const btTypedConstraint &constraint = *of.constraint;
+                    const btRigidBody &body = end == 0 ? constraint.getRigidBodyA() : constraint.getRigidBodyB();
                     if (body.isKinematicObject()) {
-                        made.target -= dot(made.jacobian[end],
-                                           six(motion{body.getLinearVelocity(), body.getAngularVelocity()}));
+                        const motion now{body.getLinearVelocity(), body.getAngularVelocity()};
+                        made.target -= dot(made.jacobian[end], six(now));
                     }
                     continue;
                 }

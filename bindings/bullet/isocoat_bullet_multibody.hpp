@@ -300,7 +300,8 @@ private:
     /// heavy as its matrix says.
     static constexpr double learned = 0.1;
 
-    /// Part of a link's own inverse inertia that its joints leave it in every direction: otherwise none is left in some.
+    /// Part of a link's own inverse inertia that its joints leave it in every direction: otherwise none is left in
+    /// some.
     static constexpr double left_over = sizeof(btScalar) == sizeof(float) ? 1e-4 : 1e-6;
 
     /// Part of a change of the joints' velocities, and of the velocities, by which they may be off unheld.
@@ -399,8 +400,8 @@ private:
         const std::array<double, 6> velocity = one.leverage.at_link(multibody.getVelocityVector());
         std::array<double, 6> acceleration = one.leverage.at_link(of.acceleration.data());
 
-        // Links of one multibody that touch at once move each other. Where isocoat does not solve them together, each is
-        // safe by itself if it seems as many times as mobile as it is.
+        // Links of one multibody that touch at once move each other. Where isocoat does not solve them together, each
+        // is safe by itself if it seems as many times as mobile as it is.
         const int others = int(std::count_if(limbs_.begin(), limbs_.end(), [&](const limb &other) {
             return &other != &one && other.multibody == one.multibody && other.touching > 0;
         }));

@@ -1719,8 +1719,8 @@ isocoat_status isocoat_world_get_link_impulses(const isocoat_world *world,
  * themselves belongs in isocoat_link_set_external_acceleration. After the step the host passes each impulse on
  * through its joints: bodies must move as the matrix says.
  *
- * It holds until it is said again, or until a link is destroyed or changes its kind, which ends its articulation.
- * Snapshots keep it.
+ * It holds until it is said again, or until a link is destroyed, changes its kind or loses its mass, which ends its
+ * articulation. Snapshots keep it.
  *
  * - world: not NULL.
  * - links: all links, articulation after articulation: host-driven, with a mass, each once; not NULL unless count

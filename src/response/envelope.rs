@@ -29,12 +29,16 @@ impl Envelope {
 
     /// Sets the shape, all zero: `first[i]` is the first block that couples with block `i`.
     pub fn reset(&mut self, first: &[u32]) {
+        self.shape(first.iter().copied());
+    }
+
+    fn shape(&mut self, first: impl Iterator<Item = u32>) {
         self.first.clear();
         self.diagonal.clear();
         let mut length = 0;
-        for (block, first) in first.iter().enumerate() {
+        for (block, first) in first.enumerate() {
             for row in 0..BLOCK {
-                let first = *first as usize * BLOCK;
+                let first = first as usize * BLOCK;
                 length += block * BLOCK + row - first + 1;
                 self.first.push(first as u32);
                 self.diagonal.push(length - 1);
@@ -113,7 +117,7 @@ impl Envelope {
 impl Envelope {
     /// Sets a matrix without gaps, by its blocks on and below the diagonal.
     pub fn fill(&mut self, count: usize, block: impl Fn(usize, usize) -> Matrix6<f64>) {
-        self.reset(&vec![0; count]);
+        self.shape(std::iter::repeat_n(0, count));
         for row in 0..count {
             for column in 0..=row {
                 self.add(row, column, &block(row, column));

@@ -54,6 +54,9 @@ impl Joined {
         }
         self.entries.sort_unstable_by_key(|entry| (entry.row, entry.other));
         self.starts.clear();
+        if self.entries.is_empty() {
+            return;
+        }
         for row in 0..=order.len() as u32 {
             self.starts.push(self.entries.partition_point(|entry| entry.row < row) as u32);
         }
