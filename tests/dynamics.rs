@@ -238,3 +238,28 @@ fn explicit_wrench_of_a_host_link_is_the_force_at_the_pose_it_was_given() {
     let impulse = world.link_impulse(link).unwrap();
     assert!((impulse.force.z / (exact * DT) - 1.0).abs() < 1e-12);
 }
+
+#[test]
+fn a_ball_thrown_to_and_fro_within_single_steps_keeps_its_energy() {
+    // It crosses the gap of 0.03 m several times a step, and meets now one wall, now the other, now both.
+    for speed in [3.0, 8.0, 15.0, 25.0] {
+        let mut world = World::new(WorldDesc::default()).unwrap();
+        add_floor(&mut world, BodyDesc { rigid: true, ..BodyDesc::default() });
+        let ceiling = Coat::cuboid(Vec3::new(0.48, 0.48, 0.03), 0.02).hard();
+        ceiling.add_fixed(&mut world, Pose::at(0.0, 0.0, 0.28));
+        let ball = Coat::ball(0.1).stiff(5e5);
+        let twist = Twist { linear: Vec3::new(0.0, 0.0, speed), angular: Vec3::zeros() };
+        let desc = LinkDesc { twist, ..ball_link(Kind::Rigid, 0.1, 0.1, 0.1) };
+        let (_, link) = ball.add(&mut world, ball.body_desc(), desc);
+        let mut fastest = 0.0f64;
+        for step in 0..240 {
+            world.step(1.0 / 120.0).unwrap();
+            let LinkState { pose, twist } = world.link_state(link).unwrap();
+            assert!((0.05..0.18).contains(&pose.position.z), "{speed} m/s: at {} m", pose.position.z);
+            assert!(twist.linear.norm() < 1.03 * speed, "{speed} m/s: {:.3} m/s in step {step}", twist.linear.norm());
+            fastest = if step < 180 { 0.0 } else { fastest.max(twist.linear.norm()) };
+        }
+        println!("{speed} m/s: at most {fastest:.3} m/s at the end of the last 60 steps");
+        assert!(fastest > 0.97 * speed);
+    }
+}

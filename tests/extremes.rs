@@ -374,3 +374,19 @@ fn all_rows() {
     std::fs::write(path, format!("{head}\n{} rows fail.\n{text}", failures.len())).unwrap();
     println!("{} rows fail", failures.len());
 }
+
+#[test]
+fn what_is_past_its_most_is_held_whatever_response_is_forced() {
+    for response in [Response::Substepped, Response::Auto, Response::Implicit] {
+        let knobs = Knobs { mass_ratio: 1e6, ..USUAL };
+        let outcome = run(slab, &knobs, response, 3.0);
+        println!(
+            "{response:?}: {} overloads, deepest {:.3} of a ball, gain {:.1e}, {:.2} ms a step",
+            outcome.overloads,
+            outcome.deepest,
+            outcome.gain,
+            1e3 * outcome.step
+        );
+        assert!(outcome.finite && outcome.overloads > 0 && !outcome.escaped && outcome.gain <= 1e-3);
+    }
+}

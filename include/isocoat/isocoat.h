@@ -275,14 +275,17 @@ typedef uint32_t isocoat_response;
  * its host, stacked, or on stiff springs, ISOCOAT_RESPONSE_SUBSTEPPED for the rest.
  */
 #define ISOCOAT_RESPONSE_AUTO 0u
-/** One evaluation of the forces a step, at its beginning: for small steps only. */
+/** One evaluation of the forces a step, at its beginning: for small steps only. Overloads are stepped implicitly. */
 #define ISOCOAT_RESPONSE_EXPLICIT 1u
 /**
  * Velocities and forces of all links in contact that agree at the end of the step: stable at any stiffness and mass,
  * exact at rest; contacts do not bounce.
  */
 #define ISOCOAT_RESPONSE_IMPLICIT 2u
-/** Many small steps inside each step; host-driven links through a mirror that lasts from step to step. */
+/**
+ * Many small steps inside each step; host-driven links through a mirror that lasts from step to step. What is pressed
+ * past the most that its coats carry, or asks for more than max_substeps, is stepped implicitly all the same.
+ */
 #define ISOCOAT_RESPONSE_SUBSTEPPED 3u
 
 /** How a contact surface is integrated: an ISOCOAT_SCHEME_ value. */
@@ -325,8 +328,8 @@ typedef struct isocoat_world_desc {
     uint32_t seed_count;
     /**
      * Upper bound of the sub-steps in one step: from 1 to 65536. Default 4096.
-     * Advice: a bound for the worst case, not for speed. Where more are wanted, ISOCOAT_RESPONSE_AUTO turns implicit:
-     * with 16 instead of 64 two balls at 60 Hz no longer bounce.
+     * Advice: a bound for the worst case, not for speed. Where more are wanted, the step is implicit; the log says
+     * so if sub-steps were forced: with 16 instead of 64 two balls at 60 Hz no longer bounce.
      */
     uint32_t max_substeps;
     /** Acceleration of gravity, in m/s^2, finite. Default 0. */

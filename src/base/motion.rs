@@ -53,6 +53,9 @@ pub struct Motion {
     pub contact_impulse: Wrench,
     /// A contact or a spring pushed it.
     pub touched: bool,
+    /// Speed that it may have in any direction after it bounced within the step: that it comes with, and what its contacts
+    /// hold in their compression \[m/s\].
+    pub recoil: f64,
 }
 
 impl Inertia {

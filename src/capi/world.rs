@@ -16,12 +16,13 @@ pub type isocoat_response = u32;
 /// The library chooses for each group of bodies in contact: ISOCOAT_RESPONSE_IMPLICIT for what is constrained, held by
 /// its host, stacked, or on stiff springs, ISOCOAT_RESPONSE_SUBSTEPPED for the rest.
 pub const ISOCOAT_RESPONSE_AUTO: isocoat_response = 0;
-/// One evaluation of the forces a step, at its beginning: for small steps only.
+/// One evaluation of the forces a step, at its beginning: for small steps only. Overloads are stepped implicitly.
 pub const ISOCOAT_RESPONSE_EXPLICIT: isocoat_response = 1;
 /// Velocities and forces of all links in contact that agree at the end of the step: stable at any stiffness and mass,
 /// exact at rest; contacts do not bounce.
 pub const ISOCOAT_RESPONSE_IMPLICIT: isocoat_response = 2;
-/// Many small steps inside each step; host-driven links through a mirror that lasts from step to step.
+/// Many small steps inside each step; host-driven links through a mirror that lasts from step to step. What is pressed
+/// past the most that its coats carry, or asks for more than max_substeps, is stepped implicitly all the same.
 pub const ISOCOAT_RESPONSE_SUBSTEPPED: isocoat_response = 3;
 
 /// How a contact surface is integrated: an ISOCOAT_SCHEME_ value.
@@ -65,8 +66,8 @@ pub struct isocoat_world_desc {
     /// 256, 3% with 1024, 0.3% with 4096; the time goes with the number.
     pub seed_count: u32,
     /// Upper bound of the sub-steps in one step: from 1 to 65536. Default 4096.
-    /// Advice: a bound for the worst case, not for speed. Where more are wanted, ISOCOAT_RESPONSE_AUTO turns implicit:
-    /// with 16 instead of 64 two balls at 60 Hz no longer bounce.
+    /// Advice: a bound for the worst case, not for speed. Where more are wanted, the step is implicit; the log says
+    /// so if sub-steps were forced: with 16 instead of 64 two balls at 60 Hz no longer bounce.
     pub max_substeps: u32,
     /// Acceleration of gravity, in m/s^2, finite. Default 0.
     pub gravity: [f64; 3],

@@ -9,7 +9,7 @@
 
 use super::friction::Bristle;
 use super::pair::Pair;
-use super::patch::{Node, Sums};
+use super::patch::{Node, Patch, Sums};
 use super::press::Material;
 use super::standing::{self, Standing};
 use super::surface::{Settings, Surface, integrate};
@@ -139,7 +139,18 @@ impl Candidate {
 
     /// The velocity that in `h` seconds would take a link to where a surface that stands was evaluated.
     pub fn velocity_looked_at(&self, link: u32, motions: &[Motion], h: f64) -> Twist {
-        self.memory.standing.velocity(link, &motions[link as usize], h)
+        self.memory.standing.velocity(&self.pair, link, &motions[link as usize], h)
+    }
+
+    /// Elastic energy in the compression of the present surface, at most: that of a force which grows in proportion to
+    /// the overlap; others hold less \[J\].
+    pub fn elastic_energy(&self) -> f64 {
+        let of = |(patch, load): (&Patch, &Sums)| {
+            let [i, j] = patch.skeletons;
+            let overlap = patch.peak_pressure * (1.0 / self.pair.a.slope(i) + 1.0 / self.pair.b.slope(j));
+            0.5 * load.force.norm() * overlap
+        };
+        self.surface.patches.iter().zip(&self.loads).map(of).sum()
     }
 
     fn integrate(&mut self, settings: &Settings) {
@@ -183,7 +194,7 @@ impl Candidate {
             if patch.nodes.0 >= patch.nodes.1 {
                 return false;
             }
-            let depth = patch.peak_pressure / self.pair.scale / patch.slope;
+            let depth = patch.depth(&self.pair);
             let size = (patch.deepest - self.surface.nodes[patch.nodes.0].position).norm();
             let limit = KEEP * tolerance.sqrt() * depth;
             for (then, now) in then.iter().zip(&now) {
@@ -228,6 +239,9 @@ pub struct Memory {
     pub was_overloaded: bool,
     /// Square of the largest rate since they touched: sub-steps never get coarser during a contact \[1/s²\].
     pub rate2: f64,
+    /// Elastic energy that they held in their compression at the end of the last step, at most; nothing where that ended
+    /// implicitly, which gives none of it back as motion \[J\].
+    pub held: f64,
     /// One a sticking patch.
     pub bristles: Vec<Bristle>,
     /// Of the surface that the last implicit step ended with.
@@ -242,7 +256,7 @@ impl Memory {
 
     /// Forgets what the contact went through, but not that it is one.
     pub fn forget_history(&mut self) {
-        self.rate2 = 0.0;
+        (self.rate2, self.held) = (0.0, 0.0);
         self.bristles.clear();
         self.standing.forget();
     }

@@ -53,6 +53,11 @@ pub struct Patch {
 }
 
 impl Patch {
+    /// The depth that motions of the contact are small or large against: half of the overlap or more \[m\].
+    pub fn depth(&self, pair: &Pair) -> f64 {
+        self.peak_pressure / pair.scale / self.slope
+    }
+
     /// What names the patch from step to step: the slots of its skeletons, and which of theirs it is.
     pub fn key(&self, pair: &Pair) -> [u32; 3] {
         let [i, j] = self.skeletons;

@@ -4,6 +4,8 @@
 //! last step's as well: what has moved by a thousandth of the depth since changes the force by a millionth beyond what
 //! the stiffness says. So contacts at rest cost no evaluations, and those that bear little may move more.
 
+use std::f64::consts::PI;
+
 use super::pair::{Pair, Side, pose_about};
 use super::patch::Node;
 use super::surface::{self, Settings, Surface};
@@ -11,7 +13,8 @@ use crate::base::Motion;
 use crate::field::{Placed, Profile, Shape};
 use crate::math::{Quat, Twist, Vec3, rotation_to_vector};
 
-/// Motion since the evaluation over the depth of a contact, up to which its surface stands.
+/// Motion since the evaluation, across over the depth of a contact and along over its width, up to which its surface
+/// stands.
 const STILL: f64 = 5e-4;
 
 /// How much farther that goes, at most, for a contact that bears little of the weight on it.
@@ -72,10 +75,20 @@ impl Standing {
                 let load: f64 = nodes.iter().map(|node| node.force.norm()).sum();
                 // What is left out is the load times the square of the motion over the depth.
                 let ease = (weight / load).sqrt().clamp(1.0, MOST_EASE);
-                let depth = patch.peak_pressure / pair.scale / patch.slope;
+                let depth = patch.depth(pair);
                 let square = |node: &Node| (patch.deepest - node.position).norm_squared();
-                let size = nodes.iter().map(square).fold(depth * depth, f64::max).sqrt();
-                self.holds(motions, &patch.deepest, depth * ease, size.max(room))
+                let area: f64 = nodes.iter().map(|node| node.area).sum();
+                let size = nodes.iter().map(square).fold((depth * depth).max(area / PI), f64::max).sqrt();
+                // Half the width of a long one.
+                let width = area / (PI * size);
+                self.places.iter().all(|place| {
+                    let motion = &motions[place.link as usize];
+                    let (moved, turned) = self.moved(place, pair, motion, &patch.deepest);
+                    let across = moved.dot(&patch.normal);
+                    let along = moved - patch.normal * across;
+                    across.abs() + turned.norm() * size.max(room) <= STILL * depth * ease
+                        && along.norm() <= STILL * width.max(depth * ease)
+                })
             })
     }
 
@@ -88,16 +101,14 @@ impl Standing {
         if weight.is_finite() { weight } else { 0.0 }
     }
 
-    /// Whether the links are still where they were, against the depth and the size of a patch about `deepest`, from the
-    /// leading link's centre.
-    fn holds(&self, motions: &[Motion], deepest: &Vec3, depth: f64, size: f64) -> bool {
-        let middle = self.places[0].center + deepest;
-        self.places.iter().all(|place| {
-            let motion = &motions[place.link as usize];
-            let turn = rotation_to_vector(&(motion.rotation * place.rotation.inverse()));
-            let moved = (motion.center - place.center) + turn.cross(&(middle - place.center));
-            moved.norm() + turn.norm() * size <= STILL * depth
-        })
+    /// How far the coat of a link has moved at a place about the leading link's centre, and turned.
+    fn moved(&self, place: &Place, pair: &Pair, motion: &Motion, at: &Vec3) -> (Vec3, Vec3) {
+        let moved = motion.center - place.center;
+        if is_round(pair, place.link, motion) {
+            return (moved, Vec3::zeros());
+        }
+        let turned = rotation_to_vector(&(motion.rotation * place.rotation.inverse()));
+        (moved + turned.cross(&(self.places[0].center + at - place.center)), turned)
     }
 
     /// Puts the skeletons of a pair where their links were.
@@ -110,12 +121,22 @@ impl Standing {
         });
     }
 
-    /// The velocity that would take a link in `h` seconds from where it is to where it was.
-    pub fn velocity(&self, link: u32, motion: &Motion, h: f64) -> Twist {
+    /// The velocity that would take the coat of a link in `h` seconds from where it is to where it was.
+    pub fn velocity(&self, pair: &Pair, link: u32, motion: &Motion, h: f64) -> Twist {
         let Some(place) = self.of(link) else { return motion.twist };
-        let turn = rotation_to_vector(&(place.rotation * motion.rotation.inverse()));
-        Twist { linear: (place.center - motion.center) / h, angular: turn / h }
+        let linear = (place.center - motion.center) / h;
+        let turn = || rotation_to_vector(&(place.rotation * motion.rotation.inverse())) / h;
+        Twist { linear, angular: if is_round(pair, link, motion) { motion.twist.angular } else { turn() } }
     }
+}
+
+/// Whether turns of a link leave its coat as it is: all that the pair has of it are points at its centre of mass.
+fn is_round(pair: &Pair, link: u32, motion: &Motion) -> bool {
+    let round = |side: &Side| {
+        let shapes = side.links.iter().zip(&side.locals).filter(|(of, _)| **of == link);
+        shapes.map(|(_, shape)| shape).all(|shape| matches!(shape, Shape::Point(at) if *at == motion.local_center))
+    };
+    round(&pair.a) && round(&pair.b) && pair.covers.iter().all(|cover| cover.link != link)
 }
 
 /// What the surface of a pair depends on besides the places of its links, as one number.

@@ -52,20 +52,24 @@ pub fn reachable(pair: &Pair, i: usize, j: usize, overlap: f64) -> Reachable {
     let (a, b) = (&pair.a.skeletons[i], &pair.b.skeletons[j]);
     let (ta, tb) = (a.profile.thickness, b.profile.thickness);
     let overlap = overlap.clamp(0.0, ta + tb);
-    // Half width of the strip: the chord of the rounding, of both where both are round all over.
+    // Half width of the strip: the chord of the rounding on something flat, and of both where both are round all over.
     let chord2 = |t: f64| (2.0 * t * overlap).min(t * t);
-    let c2 = match (&a.shape, &b.shape) {
+    let chords2 = match (&a.shape, &b.shape) {
         (Shape::Point(_), Shape::Point(_)) => {
             let t = ta * tb / (ta + tb);
-            (2.0 * t * overlap).min(ta.min(tb).powi(2))
+            [(2.0 * t * overlap).min(ta.min(tb).powi(2)); 2]
         }
-        (_, Shape::Plane { .. }) => chord2(ta),
-        (Shape::Plane { .. }, _) => chord2(tb),
-        _ => chord2(ta).min(chord2(tb)),
+        _ => [chord2(ta), chord2(tb)],
     };
-    let c = c2.sqrt();
-    let area = |shape: &Shape| footprint(shape).map_or(f64::INFINITY, |f| f.face + f.edge * c + PI * c2);
-    let area = area(&a.shape).min(area(&b.shape));
+    // The patch is within what either would lay on something flat.
+    let within = |bound: fn(&Footprint, f64) -> f64| {
+        let of = |shape: &Shape, c2: f64| footprint(shape).map_or(f64::INFINITY, |footprint| bound(&footprint, c2));
+        of(&a.shape, chords2[0]).min(of(&b.shape, chords2[1]))
+    };
+    let area = within(|footprint, c2| footprint.face + footprint.edge * c2.sqrt() + PI * c2);
+    // A uniform bar of this length with round ends.
+    let length = within(|footprint, c2| if footprint.length > 0.0 { footprint.length + 2.0 * c2.sqrt() } else { 0.0 });
+    let gyration2 = length.powi(2) / 12.0;
     let slope = |side: &super::pair::Side, skeleton: usize| {
         let profile = &side.skeletons[skeleton].profile;
         let depth = (overlap / profile.thickness).min(1.0);
@@ -73,9 +77,5 @@ pub fn reachable(pair: &Pair, i: usize, j: usize, overlap: f64) -> Reachable {
     };
     let (ga, gb) = (slope(&pair.a, i), slope(&pair.b, j));
     let series = 1.0 / (1.0 / ga + 1.0 / gb);
-    // A uniform bar of this length with round ends; no patch is longer than the shorter of the two.
-    let length = |shape: &Shape| footprint(shape).map_or(f64::INFINITY, |f| f.length);
-    let length = length(&a.shape).min(length(&b.shape));
-    let gyration2 = if length > 0.0 { (length + 2.0 * c).powi(2) / 12.0 } else { 0.0 };
     Reachable { stiffness: series * area, gyration2 }
 }

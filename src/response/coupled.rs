@@ -139,6 +139,13 @@ impl Coupled {
         self.members.clear();
     }
 
+    /// Leaves the patches, but not the walls, a part of their stiffness.
+    pub fn soften(&mut self, part: f64) {
+        for group in self.groups.iter().filter(|group| group.patch.is_some()) {
+            self.points.soften(group.points.0..group.points.1, part);
+        }
+    }
+
     /// Adds the groups of a bundle.
     pub fn append(&mut self, bundle: &Bundle) {
         let (points, members) = (self.points.count(), self.members.len());

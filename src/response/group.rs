@@ -5,6 +5,8 @@
 //! at the end of the step is `[p - h g n·(u - u_k)]₊` for the relative velocity `u` of b, when the surface was evaluated
 //! at the pose that `u_k` leads to. Friction and dissipation act with that pressure.
 
+use std::ops::Range;
+
 use nalgebra::Matrix6;
 
 use crate::contact::patch::Node;
@@ -56,6 +58,13 @@ impl Points {
     pub fn clear(&mut self) {
         for row in self.rows_mut() {
             row.clear();
+        }
+    }
+
+    /// Leaves a range of them a part of their stiffness, with as much less load at the same depth.
+    pub fn soften(&mut self, range: Range<usize>, part: f64) {
+        for figure in self.load[range.clone()].iter_mut().chain(&mut self.stiffness[range]) {
+            *figure *= part;
         }
     }
 

@@ -3,10 +3,10 @@
 
 use super::group::{Grip, Group, Member, Point, Points, relative};
 use super::sharing::Sharing;
-use super::substep::PUSH_OUT;
 use crate::base::{Inertia, Motion};
 use crate::contact::candidate::Candidate;
 use crate::contact::deepest::{self, Approach};
+use crate::contact::overload::is_overloaded;
 use crate::contact::pair::Pair;
 use crate::contact::patch::{self, Node, Patch, Sums};
 use crate::contact::press::{Carriers, Material, Share, friction_radius};
@@ -19,8 +19,14 @@ pub const CREEP: f64 = 0.01;
 /// Part of a bristle's bend that is taken back in one step.
 pub const RECOVERY: f64 = 0.2;
 
+/// Speed at which the push-out moves bodies apart, in thicknesses of the thinner coat a second.
+const PUSH_OUT: f64 = 2.0;
+
 /// Stiffness of a wall, over what would take up a mass within a step.
 const WALL: f64 = 1e3;
+
+/// Cosine between directions from which on two places of a pair face the same way.
+const FACING: f64 = 0.9;
 
 /// Groups of some candidates, with their points and members.
 #[derive(Debug, Default)]
@@ -79,9 +85,12 @@ impl Grouping<'_> {
         }
         // What must come apart, from where the step began.
         for (i, j, approach) in &surface.overloads {
-            self.bundle.carriers.find(pair, &approach.meeting);
-            let come = self.closing(approach) * h;
-            self.add_wall([*i, *j], approach, -PUSH_OUT * thinner(pair, *i, *j) * h - come);
+            let corners = corners(pair, *i, *j, approach).filter(|corner| is_overloaded(pair, *i, *j, corner));
+            for approach in std::iter::once(*approach).chain(corners) {
+                self.bundle.carriers.find(pair, &approach.meeting);
+                let come = self.closing(&approach) * h;
+                self.add_wall([*i, *j], &approach, -PUSH_OUT * thinner(pair, *i, *j) * h - come);
+            }
         }
         if !surface.overloads.is_empty() {
             return;
@@ -94,7 +103,13 @@ impl Grouping<'_> {
             let gap = approach.distance - thicknesses(pair, i, j);
             if self.last_resort {
                 // Nothing comes deeper than a coat bears, whatever its speed.
-                self.add_wall([i, j], &approach, (gap + 0.5 * thinner(pair, i, j)).max(0.0));
+                let gap_of = |approach: &Approach| approach.distance - thicknesses(pair, i, j);
+                let reach = self.reach;
+                let near = |corner: &Approach| gap_of(corner) <= reach;
+                for approach in std::iter::once(approach).chain(corners(pair, i, j, &approach).filter(near)) {
+                    let gap = gap_of(&approach);
+                    self.add_wall([i, j], &approach, (gap + 0.5 * thinner(pair, i, j)).max(0.0));
+                }
             } else if surface.patches.is_empty() && gap <= self.reach {
                 // A gap that may close, so that the next round starts from a shallow touch; one without depth has no
                 // patch yet.
@@ -215,6 +230,14 @@ fn member(trial: &[Motion], pair: &Pair, center: &Vec3, Share { link, weight }: 
 pub fn combinations(pair: &Pair) -> impl Iterator<Item = (usize, usize)> + use<> {
     let (a, b) = (pair.a.skeletons.len(), pair.b.skeletons.len());
     (0..a).flat_map(move |i| (0..b).map(move |j| (i, j)))
+}
+
+/// The corners of two skeletons that face each other as these do where they come closest: walls that hold a face, which
+/// one alone would let tip over.
+fn corners(pair: &Pair, i: usize, j: usize, approach: &Approach) -> impl Iterator<Item = Approach> {
+    let direction = approach.direction;
+    deepest::approaches_of_corners(pair, i, j)
+        .filter(move |corner| corner.direction.dot(&direction) > FACING && !pair.is_covered(&corner.meeting))
 }
 
 /// Thickness of the thinner of two coats.

@@ -53,6 +53,11 @@ const LET_GO: f64 = 5.0;
 /// Part of the speeds of a step below which a change between two rounds does not matter.
 const NEGLIGIBLE: f64 = 1e-4;
 
+/// Part of their stiffness that contacts keep where the last resort cannot be solved: nobody tells stiffer ones apart in
+/// so short a step. And how often; then nothing is pushed.
+const SOFTENING: f64 = 0.01;
+const MOST_SOFTENINGS: u32 = 4;
+
 /// Working memory of the implicit response.
 #[derive(Debug, Default)]
 pub struct Solver {
@@ -227,10 +232,14 @@ impl Solver {
         // Nearly all that contacts can do is to take away what makes the free motion differ.
         self.reach = RUSH * h * self.change(&self.free);
         let nobody_near = step.island.candidates.is_empty();
-        let mut converged = false;
+        let (mut converged, mut overloaded) = (false, false);
         for round in 0..effort.rounds {
             self.rounds += 1;
             self.look(step, h, round == 0);
+            if round == 0 {
+                let is_overloaded = |index: &u32| !step.candidates[*index as usize].surface.overloads.is_empty();
+                overloaded = step.island.candidates.iter().any(is_overloaded);
+            }
             clock.lap(&mut step.work.contact_time);
             self.couple_all(step, h, false);
             let solved =
@@ -246,7 +255,8 @@ impl Solver {
             }
         }
         if !converged {
-            if !last_resort {
+            // Halves of a step are no better where it takes the push-out to part bodies.
+            if !last_resort && !overloaded {
                 return false;
             }
             // One solve with the surfaces as they are now: what moves on is small in so short a step, and no gap closes.
@@ -254,7 +264,18 @@ impl Solver {
             self.look(step, h, false);
             clock.lap(&mut step.work.contact_time);
             self.couple_all(step, h, true);
-            self.coupled.solve(&mut self.x, &self.free, step.motions, h, ACCURACY * effort.tolerance, step.team);
+            let accuracy = ACCURACY * effort.tolerance;
+            let mut softenings = 0;
+            while !self.coupled.solve(&mut self.x, &self.free, step.motions, h, accuracy, step.team) {
+                // Forces that belong to no velocities could have any size.
+                if softenings == MOST_SOFTENINGS {
+                    self.coupled.clear();
+                    break;
+                }
+                softenings += 1;
+                self.coupled.soften(SOFTENING);
+                self.x.fill(0.0);
+            }
         }
         self.commit(step, h);
         clock.lap(&mut step.work.solve_time);
@@ -400,7 +421,7 @@ impl Solver {
                 return point.load > 0.0 || closed <= 0.0 || change.linear.norm() <= NEGLIGIBLE * speed;
             };
             let patch = &pair.surface.patches[patch as usize];
-            let depth = patch.peak_pressure / pair.pair.scale / patch.slope;
+            let depth = patch.depth(&pair.pair);
             let size = self.size(group).max(depth);
             let moved = change.linear.norm() + change.angular.norm() * size;
             // In each step anew, what is negligible in one would add up.
@@ -444,10 +465,11 @@ impl Solver {
     /// Moves the links by the velocities found, and hands every contact its forces.
     fn commit(&mut self, step: &mut Step, h: f64) {
         self.before.clear();
-        for articulation in step.articulations_of_island() {
+        let articulations = step.articulations_of_island();
+        for articulation in articulations.clone() {
             self.before.extend(articulation.links.iter().map(|link| step.motions[*link as usize].contact_impulse));
         }
-        let Step { motions, island, candidates, articulations, .. } = step;
+        let Step { motions, island, candidates, .. } = step;
         for index in &island.candidates {
             let candidate = &mut candidates[*index as usize];
             candidate.loads.clear();
@@ -483,8 +505,7 @@ impl Solver {
             }
         }
         let mut before = self.before.iter();
-        for index in &island.articulations {
-            let articulation = &articulations[*index as usize];
+        for articulation in articulations {
             for (from, (link, before)) in articulation.links.iter().zip(&mut before).enumerate() {
                 let mut impulse = motions[*link as usize].contact_impulse;
                 impulse.add_scaled(before, -1.0);

@@ -21,11 +21,12 @@ pub enum Response {
     /// or on stiff springs, [`Response::Substepped`] for the rest.
     #[default]
     Auto,
-    /// One force evaluation a step, at the pose of its beginning.
+    /// One force evaluation a step, at the pose of its beginning; overloads are left to [`Response::Implicit`].
     Explicit,
     /// Velocities and forces that agree at the end of the step: stable at any stiffness, and never bouncing.
     Implicit,
-    /// Many small steps inside each step; host-driven links through a persistent mirror.
+    /// Many small steps inside each step; host-driven links through a persistent mirror. Overloads, and what asks for
+    /// more than the world's `max_substeps`, are left to [`Response::Implicit`].
     Substepped,
 }
 

@@ -5,16 +5,12 @@ use crate::base::{Articulation, Motion, Spring};
 use crate::clock::Clock;
 use crate::contact::candidate::{Candidate, Kept};
 use crate::contact::friction;
-use crate::contact::pair::Pair;
+use crate::contact::patch;
 use crate::contact::press::{Carriers, Grip, friction_radius, press};
 use crate::contact::surface::Settings;
 use crate::contact::tally::Tally;
-use crate::contact::{deepest::Approach, patch};
-use crate::math::{Vec3, Wrench};
+use crate::math::Vec3;
 use crate::team::Team;
-
-/// Speed at which the push-out moves bodies apart, in thicknesses of the thinner coat a second.
-pub const PUSH_OUT: f64 = 2.0;
 
 /// Bodies that are stepped together.
 #[derive(Clone, Debug, Default)]
@@ -25,7 +21,7 @@ pub struct Island {
     pub candidates: Vec<u32>,
     /// Springs between the links.
     pub springs: Vec<Spring>,
-    /// Positions in a list of articulations.
+    /// Positions in a list of articulations; none where each link is taken by itself.
     pub articulations: Vec<u32>,
 }
 
@@ -85,21 +81,36 @@ impl Work {
     }
 }
 
-impl Step<'_> {
+impl<'a> Step<'a> {
     /// The articulations of the island.
-    pub fn articulations_of_island(&self) -> impl Iterator<Item = &Articulation> + Clone {
-        self.island.articulations.iter().map(|index| &self.articulations[*index as usize])
+    pub fn articulations_of_island(&self) -> impl Iterator<Item = &'a Articulation> + Clone + use<'a> {
+        let (island, articulations) = (self.island, self.articulations);
+        island.articulations.iter().map(|index| &articulations[*index as usize])
     }
 
     /// Advances by `h`, with the part `before` of the drift before the kick: a half for the symplectic second order, none
     /// for the force at the pose of the beginning. With `fresh`, all contact surfaces are integrated anew.
-    pub fn advance(&mut self, h: f64, before: f64, fresh: bool) {
+    ///
+    /// Where a contact is past the most that it carries, no force would part the bodies: false then, and everybody is
+    /// back where he was, but for rounding.
+    pub fn advance(&mut self, h: f64, before: f64, fresh: bool) -> bool {
         let Self { motions, island, candidates, settings, work, team, .. } = self;
         drift(motions, island, before * h);
         let mut clock = Clock::start(work.timed);
         let motions = &mut **motions;
         work.look(island, candidates, team, |candidate| candidate.look(motions, settings, fresh));
         clock.lap(&mut work.contact_time);
+        let mut overloaded = false;
+        for index in &island.candidates {
+            let Candidate { surface, memory, .. } = &mut *candidates[*index as usize];
+            if !surface.overloads.is_empty() {
+                (memory.overloaded, memory.touched, overloaded) = (true, true, true);
+            }
+        }
+        if overloaded {
+            drift(motions, island, -before * h);
+            return false;
+        }
         for index in &island.candidates {
             let candidate = &mut candidates[*index as usize];
             if candidate.material.static_friction > 0.0 {
@@ -119,11 +130,12 @@ impl Step<'_> {
         springs::damp(island.springs.iter().rev(), motions, 0.5 * h);
         drift(motions, island, (1.0 - before) * h);
         clock.lap(&mut work.solve_time);
+        true
     }
 }
 
 pub(super) fn drift(motions: &mut [Motion], island: &Island, h: f64) {
-    if h > 0.0 {
+    if h != 0.0 {
         for link in &island.links {
             motions[*link as usize].drift(h);
         }
@@ -171,26 +183,6 @@ fn press_candidate(candidate: &mut Candidate, index: usize, motions: &mut [Motio
                 radius: friction_radius(nodes, &sums),
             });
         }
-    }
-    for (i, j, approach) in &surface.overloads {
-        memory.overloaded = true;
-        memory.touched = true;
-        let thickness = pair.a.skeletons[*i].profile.thickness.min(pair.b.skeletons[*j].profile.thickness);
-        push_out(pair, approach, PUSH_OUT * thickness, motions, &mut work.carriers);
-    }
-}
-
-/// Stops two bodies that press on past the most that their coats can carry, and moves them apart: an inelastic
-/// impulse along the line on which their skeletons come closest.
-fn push_out(pair: &Pair, approach: &Approach, speed: f64, motions: &mut [Motion], carriers: &mut Carriers) {
-    carriers.find(pair, &approach.meeting);
-    let direction = &approach.direction;
-    let parting = carriers.slip(motions, &pair.origin, &approach.meeting).dot(direction);
-    let mobility = carriers.mobility(motions, &pair.origin, &approach.meeting);
-    let along = direction.dot(&(mobility * direction));
-    if parting < speed && along > 0.0 {
-        let impulse = Wrench { force: direction * ((speed - parting) / along), torque: Vec3::zeros() };
-        carriers.push(motions, &pair.origin, &approach.meeting, &impulse);
     }
 }
 

@@ -7,7 +7,7 @@
 use super::springs;
 use super::substep::{Island, Step};
 use crate::base::Motion;
-use crate::contact::candidate::Kept;
+use crate::contact::candidate::{Candidate, Kept};
 use crate::contact::deepest::{self, Approach};
 use crate::contact::pair::{Pair, Side};
 use crate::contact::stiffness::reachable;
@@ -20,30 +20,22 @@ const TRAVEL: f64 = 0.25;
 /// two balls, whose force grows with the square of the depth.
 const STOPPING: f64 = 1.75;
 
-/// Bounds on the number of sub-steps.
-#[derive(Clone, Copy, Debug)]
-pub struct Limits {
-    /// Largest product of contact frequency and sub-step \[rad\].
-    pub phase: f64,
-    /// Most sub-steps in a step.
-    pub most: u32,
-}
-
-/// Sub-steps that an island's step of `dt` asks for. `rates` has a place for each link, all zero, and is left so.
+/// Sub-steps that an island's step of `dt` asks for, with `phase` the largest product of contact frequency and sub-step
+/// \[rad\]. `rates` has a place for each link, all zero, and is left so.
 pub fn plan(
     motions: &[Motion],
     island: &Island,
     candidates: &mut [Kept],
     dt: f64,
-    limits: &Limits,
+    phase: f64,
     rates: &mut [f64],
 ) -> f64 {
-    let mut travel = 0.0f64;
+    let (mut travel, mut rate2) = (0.0f64, 0.0f64);
     for index in &island.candidates {
         let candidate = &mut candidates[*index as usize];
         candidate.pair.place(motions, candidate.lead);
-        let (rate2, crossed) = demand(&candidate.pair, motions, dt);
-        candidate.memory.rate2 = if candidate.memory.touching { rate2.max(candidate.memory.rate2) } else { rate2 };
+        let (reached, crossed) = demand(&candidate.pair, motions, dt, |_| 0.0);
+        candidate.memory.rate2 = if candidate.memory.touching { reached.max(candidate.memory.rate2) } else { reached };
         travel = travel.max(crossed);
         for link in links(&candidate.pair) {
             if motions[link as usize].is_movable() {
@@ -51,22 +43,32 @@ pub fn plan(
             }
         }
     }
+    // Those that bounce off one may meet another in the same step: by then mostly out of the first.
+    for index in &island.candidates {
+        let Candidate { pair, memory, .. } = &mut *candidates[*index as usize];
+        let thrown = |link: u32| {
+            let others = rates[link as usize] > memory.rate2;
+            if others { motions[link as usize].recoil } else { 0.0 }
+        };
+        if !memory.touching && links(pair).any(|link| thrown(link) > 0.0) {
+            let (reached, crossed) = demand(pair, motions, dt, thrown);
+            memory.rate2 = reached;
+            (rate2, travel) = (rate2.max(reached), travel.max(crossed));
+        }
+    }
     springs::add_rates(&island.springs, motions, rates);
-    let mut rate2 = 0.0f64;
     for link in &island.links {
         rate2 = rate2.max(std::mem::take(&mut rates[*link as usize]));
     }
-    (rate2.sqrt() * dt / limits.phase).max(travel / TRAVEL).ceil().max(1.0)
+    (rate2.sqrt() * dt / phase).max(travel / TRAVEL).ceil().max(1.0)
 }
 
-/// Advances an island by `dt` in the sub-steps that [`plan`] wants, as far as the limits let it. Gives their number.
-pub fn step(step: &mut Step, dt: f64, limits: &Limits, wanted: f64) -> u32 {
-    let substeps = wanted.min(f64::from(limits.most)) as u32;
+/// Advances an island by `dt` in as many sub-steps as [`plan`] wants. Gives how many there were, and the time that is
+/// left where an overload ended them.
+pub fn step(step: &mut Step, dt: f64, substeps: u32) -> (u32, f64) {
     let h = dt / f64::from(substeps);
-    for index in 0..substeps {
-        step.advance(h, 0.5, index == 0);
-    }
-    substeps
+    let taken = (0..substeps).take_while(|index| step.advance(h, 0.5, *index == 0)).count() as u32;
+    (taken, f64::from(substeps - taken) * h)
 }
 
 /// The links of a pair, each once.
@@ -79,8 +81,8 @@ fn links(pair: &Pair) -> impl Iterator<Item = u32> + '_ {
 }
 
 /// Square of the largest rate that a pair can reach in a step, and how many times the thinner coat its skeletons may
-/// approach each other.
-fn demand(pair: &Pair, motions: &[Motion], dt: f64) -> (f64, f64) {
+/// approach each other, as fast as they do or as other contacts have `thrown` their links. Zeros for what will not meet.
+fn demand(pair: &Pair, motions: &[Motion], dt: f64, thrown: impl Fn(u32) -> f64) -> (f64, f64) {
     let (mut rate2, mut crossed) = (0.0, 0.0f64);
     for i in 0..pair.a.skeletons.len() {
         for j in 0..pair.b.skeletons.len() {
@@ -88,8 +90,9 @@ fn demand(pair: &Pair, motions: &[Motion], dt: f64) -> (f64, f64) {
             if pair.is_covered(&approach.meeting) {
                 continue;
             }
-            let speed = closing_speed(pair, i, j, &approach, motions, dt);
             let overlap = pair.a.reach[i] + pair.b.reach[j] - approach.distance;
+            let closing = closing_speed(pair, i, j, &approach, motions, dt);
+            let speed = closing.max(thrown(pair.a.links[i]) + thrown(pair.b.links[j]));
             if overlap + speed * dt <= 0.0 {
                 continue;
             }

@@ -102,6 +102,7 @@ impl World {
                 overloaded: _,
                 was_overloaded: _,
                 rate2,
+                held,
                 bristles,
                 standing,
             } = memory;
@@ -123,6 +124,9 @@ impl World {
             last = Some((pair, *part));
             if rate2.is_nan() || *rate2 < 0.0 {
                 return refuse("the rate is not a number of at least 0");
+            }
+            if held.is_nan() || *held < 0.0 {
+                return refuse("the elastic energy is not a number of at least 0");
             }
             for Bristle { key, slip, turn, sliding: _, seen: _ } in bristles {
                 if key[..2].iter().any(|skeleton| *skeleton as usize >= self.skeletons.capacity()) {

@@ -101,8 +101,11 @@ impl World {
 
     pub(super) fn fill_side(&self, side: &mut Side, body: &Body, motions: &[Motion], region: &(Vec3, Vec3), dt: f64) {
         side.begin(body);
-        for (position, part) in self.skeletons_of(body).enumerate() {
-            if self.is_within(&part, motions, region, dt) {
+        let mut parts = self.skeletons_of(body).enumerate().peekable();
+        while let Some((position, part)) = parts.next() {
+            // The only one is what the body's bounds are of.
+            let only = position == 0 && parts.peek().is_none() && !matches!(part.2.desc.shape, Shape::Plane { .. });
+            if only || self.is_within(&part, motions, region, dt) {
                 side.add(&part, position, self.desc.seed_count);
             }
         }
@@ -240,12 +243,13 @@ impl Skeleton {
 fn swept(shape: &Shape, margin: f64, motion: &Motion, dt: f64) -> (Vec3, Vec3) {
     let pose = motion.pose();
     let (low, high) = shape.transformed(&pose).bounds(margin);
-    // Translation goes one way; turning and acceleration may go any.
+    // Translation goes one way; turning, acceleration and bounces may go any.
     let path = motion.twist.linear * dt;
     let size = (high - low).norm() + (pose.position - motion.center).norm();
     let turned = if size.is_finite() { (motion.twist.angular.norm() * dt).min(2.0) * size } else { 0.0 };
     let any = Vec3::repeat(0.5 * motion.acceleration.norm() * dt * dt + turned);
-    (low + path.inf(&Vec3::zeros()) - any, high + path.sup(&Vec3::zeros()) + any)
+    let bounce = Vec3::repeat(motion.recoil * dt);
+    (low + path.inf(&-bounce) - any, high + path.sup(&bounce) + any)
 }
 
 /// How far contacts may carry a body beyond its free path in a step, over its margin: without, contacts that begin within
@@ -257,8 +261,11 @@ fn swept_ball(shape: &Shape, margin: f64, motion: &Motion, dt: f64) -> (Vec3, f6
     let middle = motion.pose().transform_point(&shape.middle());
     let path = motion.twist.linear * dt;
     let turned = (motion.twist.angular.norm() * dt).min(2.0) * (middle - motion.center).norm();
-    let any = 0.5 * (path.norm() + motion.acceleration.norm() * dt * dt) + turned;
-    (middle + path * 0.5, shape.half_extent() + (1.0 + ROOM) * margin + any)
+    let any = 0.5 * motion.acceleration.norm() * dt * dt + turned;
+    // Bounces are at least as fast as what comes, where they are foreseen.
+    let bounce = motion.recoil * dt;
+    let (middle, reach) = if bounce > 0.0 { (middle, bounce) } else { (middle + path * 0.5, 0.5 * path.norm()) };
+    (middle, shape.half_extent() + (1.0 + ROOM) * margin + any + reach)
 }
 
 /// Whether all of a region is farther than `reach` above a plane, which has no bounds that would tell.

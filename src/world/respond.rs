@@ -43,7 +43,8 @@ struct Rules<'a> {
     dt: f64,
     articulations: &'a [Articulation],
     settings: surface::Settings,
-    limits: substepped::Limits,
+    /// Largest product of contact frequency and sub-step \[rad\].
+    phase: f64,
     effort: implicit::Effort,
 }
 
@@ -71,20 +72,23 @@ impl Rules<'_> {
         }
         let articulations = self.articulations;
         let mut step = Step { motions, island, candidates, articulations, settings: &self.settings, work, team };
-        *outcome = match response {
+        // What is past the most that its contacts carry is held by the implicit response alone, whoever forces another.
+        let (substeps, left) = match response {
             Response::Explicit => {
-                explicit::step(&mut step, dt);
-                Outcome { substeps: 1, ..Outcome::default() }
+                if explicit::step(&mut step, dt) {
+                    (1, 0.0)
+                } else {
+                    (0, dt)
+                }
             }
-            Response::Implicit => {
-                implicit::step(&mut step, dt, &self.effort, solver);
-                Outcome { rounds: solver.rounds, splits: solver.splits, ..Outcome::default() }
-            }
-            Response::Auto | Response::Substepped => {
-                let substeps = substepped::step(&mut step, dt, &self.limits, *substeps);
-                Outcome { substeps, ..Outcome::default() }
-            }
+            Response::Implicit => (0, dt),
+            Response::Auto | Response::Substepped => substepped::step(&mut step, dt, *substeps as u32),
         };
+        *outcome = Outcome { substeps, ..Outcome::default() };
+        if left > 0.0 {
+            implicit::step(&mut step, left, &self.effort, solver);
+            (outcome.rounds, outcome.splits) = (solver.rounds, solver.splits);
+        }
         // Links that the host moves whatever happens start every island from the host's pose.
         for (link, pose) in driven.iter() {
             (motions[*link as usize].center, motions[*link as usize].rotation) = *pose;
@@ -137,7 +141,7 @@ fn plan(state: &mut Stepping, rules: &Rules, team: &Team) {
         if group.response == Response::Substepped {
             let Group { island, candidates, .. } = group;
             let rates = &mut idle(workers).1.rates;
-            group.substeps = substepped::plan(motions, island, candidates, rules.dt, &rules.limits, rates);
+            group.substeps = substepped::plan(motions, island, candidates, rules.dt, rules.phase, rates);
         }
     });
 }
@@ -176,7 +180,7 @@ impl World {
             dt,
             articulations: &articulations,
             settings: surface::Settings { scheme: self.desc.scheme, tolerance: self.desc.force_tolerance },
-            limits: substepped::Limits { phase: self.desc.substep_phase, most: self.desc.max_substeps },
+            phase: self.desc.substep_phase,
             effort: implicit::Effort {
                 rounds: self.desc.implicit_rounds,
                 tolerance: self.desc.implicit_tolerance,
@@ -194,7 +198,8 @@ impl World {
         }
         for index in 0..state.island_count {
             let (response, forced) = self.choose(&state.islands[index].island, state, dt);
-            (state.islands[index].response, state.islands[index].forced) = (response, forced);
+            let group = &mut state.islands[index];
+            (group.response, group.forced, group.substeps) = (response, forced, 0.0);
         }
         // Others than the implicit response take each link by itself.
         for Group { island, response, .. } in &state.islands[..state.island_count] {
@@ -206,17 +211,20 @@ impl World {
         }
         state.hand_out_candidates();
         plan(state, &rules, team);
+        let most = f64::from(self.desc.max_substeps);
         for index in 0..state.island_count {
             let group = &mut state.islands[index];
             // Too few sub-steps would gain energy without end.
-            if group.response == Response::Substepped && group.substeps > f64::from(rules.limits.most) && !group.forced
-            {
+            if group.substeps > most {
                 group.response = Response::Implicit;
                 for articulation in &group.island.articulations {
                     articulations[*articulation as usize].set_inertias(&mut state.motions);
                 }
             }
             let response = group.response;
+            if response != Response::Implicit {
+                group.island.articulations.clear();
+            }
             self.meet_hosts(state, index, response, dt, &articulations);
         }
         for worker in &mut state.workers {
@@ -238,12 +246,12 @@ impl World {
             rules.step(group, &mut state.motions, work, implicit, team);
         }
         state.collect_candidates();
-        self.gather_up(state, &rules.limits);
+        self.gather_up(state);
         self.articulations = articulations;
     }
 
     /// What the islands come to, in their order.
-    fn gather_up(&mut self, state: &mut Stepping, limits: &substepped::Limits) {
+    fn gather_up(&mut self, state: &mut Stepping) {
         let Stepping { islands, workers, motions, candidates, .. } = state;
         let groups = &mut islands[..state.island_count];
         let mut counters =
@@ -260,8 +268,8 @@ impl World {
             counters.substeps = counters.substeps.max(substeps);
             counters.implicit_rounds = counters.implicit_rounds.max(rounds);
             counters.implicit_splits = counters.implicit_splits.max(splits);
-            if group.response == Response::Substepped {
-                short = short.max(group.substeps / f64::from(substeps));
+            if group.forced {
+                short = short.max(group.substeps);
             }
             for link in &group.supports {
                 motions[*link as usize].contact_impulse = Wrench::default();
@@ -278,14 +286,14 @@ impl World {
         counters.evaluations = counters.by_scheme.total();
         counters.substeps = counters.substeps.max(state.system.substeps);
         state.counters = counters;
-        if short > 1.0
+        let most = self.desc.max_substeps;
+        if short > f64::from(most)
             && let Some(log) = self.log.get_mut()
         {
             let text = format!(
-                "the stiffest contact asks for {:.0} sub-steps, max_substeps allows {}: raise it, or lower \
-                 stiffness_scale or dt",
-                short * f64::from(limits.most),
-                limits.most
+                "the stiffest contact asks for {:.0} sub-steps, max_substeps allows {}: the step was implicit; raise max_substeps, \
+                 or lower stiffness_scale or dt",
+                short, most
             );
             log(LogLevel::Warning, &text);
         }

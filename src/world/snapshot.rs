@@ -38,7 +38,7 @@ use crate::substance::{Bond, Particle, ParticleId, ParticleSlot, Substance, Subs
 use crate::team::Alone;
 
 /// What the lists below say. Another number is refused: no snapshot is ever half understood.
-const FORMAT: u32 = 7;
+const FORMAT: u32 = 8;
 const MAGIC: [u8; 8] = *b"isocoat\0";
 /// Offsets of the parts of the header.
 const FORMAT_AT: usize = 8;
@@ -107,7 +107,7 @@ structs! {
     Mirror {
         active, twist, expected_center, expected_rotation, expected_twist, commanded, owed, estimate, bypassed, doubt,
     }
-    Memory { ids, part, touching, touched, overloaded, was_overloaded, rate2, bristles, standing }
+    Memory { ids, part, touching, touched, overloaded, was_overloaded, rate2, held, bristles, standing }
     Standing { likeness, places }
     Place { link, center, rotation }
     Bristle { key, slip, turn, sliding, seen }

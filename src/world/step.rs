@@ -272,8 +272,36 @@ impl World {
             (link.applied_force, link.applied_impulse) = (Wrench::default(), Wrench::default());
             state.motions[index] = motion;
         }
+        self.foresee_bounces(state);
         for articulation in &self.articulations {
             articulation.set_inertias(&mut state.motions);
+        }
+    }
+
+    /// How fast the links of those that may bounce in sub-steps can be in directions they do not move in yet: as they come,
+    /// and by what their contacts hold, over the mass of the body.
+    fn foresee_bounces(&self, state: &mut Stepping) {
+        let bounces = |body: &super::Body| match body.desc.response {
+            Response::Auto => matches!(self.desc.response, Response::Auto | Response::Substepped),
+            own => own == Response::Substepped,
+        };
+        for candidate in state.candidates.iter().filter(|candidate| candidate.memory.held > 0.0) {
+            let [a, b] = candidate.memory.ids.map(|id| self.bodies.get(BodyId::from_raw(id)).ok());
+            for body in [a, b.filter(|_| candidate.bodies[0] != candidate.bodies[1])].into_iter().flatten() {
+                let moving = || body.links.iter().filter(|link| state.motions[**link as usize].is_movable());
+                let mass: f64 = moving().map(|link| 1.0 / state.motions[*link as usize].inverse_mass()).sum();
+                for link in body.links.iter().filter(|_| mass > 0.0) {
+                    state.motions[*link as usize].recoil += 2.0 * candidate.memory.held / mass;
+                }
+            }
+        }
+        for body in self.bodies.indices().map(|slot| &self.bodies[slot]).filter(|body| !body.is_asleep()) {
+            for link in &body.links {
+                let motion = &mut state.motions[*link as usize];
+                let foreseen = motion.is_movable() && bounces(body);
+                let speed2 = motion.twist.linear.norm_squared() + motion.recoil;
+                motion.recoil = if foreseen { speed2.sqrt() } else { 0.0 };
+            }
         }
     }
 
@@ -526,6 +554,7 @@ impl World {
             if !self.links.is_live(index) || self.sleeps(&self.links[index]) {
                 continue;
             }
+            state.motions[index].recoil = 0.0;
             let motion = &state.motions[index];
             let hosted = self.links[index].desc.kind == Kind::Host && motion.is_movable();
             let host = if hosted { self.host(&self.links[index]) } else { Host::default() };
@@ -579,12 +608,13 @@ impl World {
             gone.memory.forget();
             state.spare.push(gone);
         }
-        for candidate in &mut state.candidates {
+        for (index, candidate) in state.candidates.iter_mut().enumerate() {
             let bodies = candidate.bodies.map(|body| self.bodies.id_of(body as usize));
             let first = state.contacts.len();
             self.contacts_of(candidate, &mut state.contacts);
             let overloaded = !candidate.surface.overloads.is_empty();
             let touching = state.contacts.len() > first || overloaded;
+            let elastic_energy = candidate.elastic_energy();
             let memory = &mut candidate.memory;
             memory.ids = bodies.map(|body| body.raw);
             let mut say = |kind| state.events.push(Event { kind, bodies });
@@ -602,6 +632,8 @@ impl World {
                 say(EventKind::Overload);
             }
             memory.touching = touching;
+            let implicit = state.islands[state.owners[index] as usize].outcome.rounds > 0;
+            memory.held = if implicit { 0.0 } else { elastic_energy };
             memory.was_overloaded = overloaded || memory.overloaded && touching;
             memory.overloaded = false;
         }
