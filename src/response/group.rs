@@ -339,14 +339,21 @@ impl Kernel for Question<'_> {
 
     #[inline(always)]
     fn run<const W: usize>(self) -> [f64; COUNT] {
+        if self.with_slope { self.sums::<COUNT>() } else { self.sums::<LL>() }
+    }
+}
+
+impl Question<'_> {
+    /// The first `ROWS` of the list, over all points. Room for more than is wanted would have to be cleared each time.
+    #[inline(always)]
+    fn sums<const ROWS: usize>(&self) -> [f64; COUNT] {
         let (first, end) = self.group.points;
-        let mut sums = [[0.0; LANES]; COUNT];
-        let mut values = [[0.0; CHUNK]; COUNT];
+        // As constants they are cleared at once, and not row by row.
+        let (mut sums, mut values) = const { ([[0.0; LANES]; ROWS], [[0.0; CHUNK]; ROWS]) };
         for first in (first..end).step_by(CHUNK) {
             let count = CHUNK.min((end - first).next_multiple_of(LANES));
             self.answer(first, count, &mut values);
-            let wanted = if self.with_slope { COUNT } else { LL };
-            for (sums, values) in sums[..wanted].iter_mut().zip(&values) {
+            for (sums, values) in sums.iter_mut().zip(&values) {
                 for values in values[..count].chunks_exact(LANES) {
                     for (sum, value) in sums.iter_mut().zip(values) {
                         *sum += value;
@@ -354,29 +361,30 @@ impl Kernel for Question<'_> {
                 }
             }
         }
-        sums.map(|sums| Lanes(sums).sum())
+        let mut list = [0.0; COUNT];
+        for (figure, sums) in list.iter_mut().zip(sums) {
+            *figure = Lanes(sums).sum();
+        }
+        list
     }
-}
 
-impl Question<'_> {
     /// What each of `count` points comes to.
     #[inline(always)]
-    fn answer<const N: usize>(&self, first: usize, count: usize, values: &mut [[f64; N]; COUNT]) {
-        match (self.with_slope, self.group.grip.coefficient > 0.0) {
-            (false, false) => self.each::<N, false, false>(first, count, values),
-            (false, true) => self.each::<N, false, true>(first, count, values),
-            (true, false) => self.each::<N, true, false>(first, count, values),
-            (true, true) => self.each::<N, true, true>(first, count, values),
+    fn answer<const N: usize, const ROWS: usize>(&self, first: usize, count: usize, values: &mut [[f64; N]; ROWS]) {
+        if self.group.grip.coefficient > 0.0 {
+            self.each::<N, ROWS, true>(first, count, values);
+        } else {
+            self.each::<N, ROWS, false>(first, count, values);
         }
     }
 
     // Plain numbers point by point, without a branch: so the compiler works on many side by side.
     #[inline(always)]
-    fn each<const N: usize, const SLOPE: bool, const FRICTION: bool>(
+    fn each<const N: usize, const ROWS: usize, const FRICTION: bool>(
         &self,
         first: usize,
         count: usize,
-        values: &mut [[f64; N]; COUNT],
+        values: &mut [[f64; N]; ROWS],
     ) {
         let Self {
             group: Group { material: Material { dissipation, viscous, .. }, grip, base, .. }, relative, h, ..
@@ -425,7 +433,7 @@ impl Question<'_> {
             put_vector(ALL + 3, arm.cross(&force));
             put_vector(NORMAL, normal * load);
             values[LOAD][i] = load;
-            if SLOPE {
+            if ROWS > LL {
                 let mut ll = normal * (normal * (across - along)).transpose();
                 if FRICTION {
                     ll -= slip * (slip * spared).transpose();
