@@ -2,7 +2,8 @@
 //!
 //! An implicit round takes each surface as linear in the motion about the pose of its evaluation. That pose may be the
 //! last step's as well: what has moved by a thousandth of the depth since changes the force by a millionth beyond what
-//! the stiffness says. So contacts at rest cost no evaluations, and those that bear little may move more.
+//! the stiffness says, and what has moved along by a thousandth of the width turns it by less than that. So contacts at
+//! rest cost no evaluations, and those that bear little may move more.
 
 use std::f64::consts::PI;
 

@@ -260,12 +260,10 @@ impl Group {
     /// part that would make it lopsided.
     pub fn respond(&self, points: &Points, relative: &Twist, h: f64, slope: Option<&mut Slope>) -> Push {
         let question = Question { group: self, points, relative, h, with_slope: slope.is_some() };
-        let sums = if self.points.1 - self.points.0 == 1 {
-            let mut values = [[0.0]; COUNT];
-            question.answer(self.points.0, 1, &mut values);
-            values.map(|[value]| value)
-        } else {
-            Dispatch::best().run(question)
+        let sums = match (self.points.1 - self.points.0, question.with_slope) {
+            (1, false) => question.of_one::<LL>(),
+            (1, true) => question.of_one::<COUNT>(),
+            _ => Dispatch::best().run(question),
         };
         let vector = |first: usize| Vec3::from_column_slice(&sums[first..first + 3]);
         let wrench = |first: usize| Wrench { force: vector(first), torque: vector(first + 3) };
@@ -365,6 +363,16 @@ impl Question<'_> {
         for (figure, sums) in list.iter_mut().zip(sums) {
             *figure = Lanes(sums).sum();
         }
+        list
+    }
+
+    /// The same for a lone point.
+    #[inline(always)]
+    fn of_one<const ROWS: usize>(&self) -> [f64; COUNT] {
+        let mut values = [[0.0]; ROWS];
+        self.answer(self.group.points.0, 1, &mut values);
+        let mut list = [0.0; COUNT];
+        list[..ROWS].copy_from_slice(values.as_flattened());
         list
     }
 
