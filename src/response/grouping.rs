@@ -100,17 +100,16 @@ impl Grouping<'_> {
             if pair.is_covered(&approach.meeting) {
                 continue;
             }
-            let gap = approach.distance - thicknesses(pair, i, j);
+            let reach = self.reach;
+            let gap_of = |approach: &Approach| approach.distance - thicknesses(pair, i, j);
+            let gap = gap_of(&approach);
             if self.last_resort {
                 // Nothing comes deeper than a coat bears, whatever its speed.
-                let gap_of = |approach: &Approach| approach.distance - thicknesses(pair, i, j);
-                let reach = self.reach;
-                let near = |corner: &Approach| gap_of(corner) <= reach;
-                for approach in std::iter::once(approach).chain(corners(pair, i, j, &approach).filter(near)) {
-                    let gap = gap_of(&approach);
-                    self.add_wall([i, j], &approach, (gap + 0.5 * thinner(pair, i, j)).max(0.0));
+                let near = corners(pair, i, j, &approach).filter(|corner| gap_of(corner) <= reach);
+                for wall in std::iter::once(approach).chain(near) {
+                    self.add_wall([i, j], &wall, (gap_of(&wall) + 0.5 * thinner(pair, i, j)).max(0.0));
                 }
-            } else if surface.patches.is_empty() && gap <= self.reach {
+            } else if surface.patches.is_empty() && gap <= reach {
                 // A gap that may close, so that the next round starts from a shallow touch; one without depth has no
                 // patch yet.
                 self.add_gap([i, j], &approach, gap.max(0.0));

@@ -259,7 +259,8 @@ impl Solver {
             if !last_resort && !overloaded {
                 return false;
             }
-            // One solve with the surfaces as they are now: what moves on is small in so short a step, and no gap closes.
+            // One solve with the surfaces as they are now: what moves on is small in so short a step, or stopped by the
+            // walls of an overload, and no gap closes.
             self.x.fill(0.0);
             self.look(step, h, false);
             clock.lap(&mut step.work.contact_time);

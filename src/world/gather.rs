@@ -3,7 +3,8 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use super::{Body, Link, Skeleton, World};
+use super::step::Stepping;
+use super::{Body, BodyId, Link, Skeleton, World};
 use crate::base::{Inertia, Kind, Motion};
 use crate::coat::seeds::Ray;
 use crate::contact::broad_phase::Bounds;
@@ -12,6 +13,7 @@ use crate::contact::pair::{Cover, Side};
 use crate::contact::press::Material;
 use crate::field::{Placed, Shape};
 use crate::math::{Pose, Twist, Vec3};
+use crate::response::Response;
 
 impl World {
     /// The motion of a link as the host or the last step left it.
@@ -59,6 +61,33 @@ impl World {
                 skeleton.enabled.then_some((*link, *index, skeleton))
             })
         })
+    }
+
+    /// How fast the links of those that may bounce in sub-steps can be in directions they do not move in yet: as they come,
+    /// and by what their contacts hold, over the mass of the body. What joints hold does not fly where it is thrown.
+    pub(super) fn foresee_bounces(&self, state: &mut Stepping) {
+        let bounces = |body: &Body| match body.desc.response {
+            Response::Auto => matches!(self.desc.response, Response::Auto | Response::Substepped),
+            own => own == Response::Substepped,
+        };
+        for candidate in state.candidates.iter().filter(|candidate| candidate.memory.held > 0.0) {
+            let [a, b] = candidate.memory.ids.map(|id| self.bodies.get(BodyId::from_raw(id)).ok());
+            for body in [a, b.filter(|_| candidate.bodies[0] != candidate.bodies[1])].into_iter().flatten() {
+                let moving = || body.links.iter().filter(|link| state.motions[**link as usize].is_movable());
+                let mass: f64 = moving().map(|link| 1.0 / state.motions[*link as usize].inverse_mass()).sum();
+                for link in body.links.iter().filter(|_| mass > 0.0) {
+                    state.motions[*link as usize].recoil += 2.0 * candidate.memory.held / mass;
+                }
+            }
+        }
+        for body in self.bodies.indices().map(|slot| &self.bodies[slot]).filter(|body| !body.is_asleep()) {
+            for link in &body.links {
+                let motion = &mut state.motions[*link as usize];
+                let foreseen = motion.is_movable() && bounces(body) && !self.links[*link as usize].is_held();
+                let speed2 = motion.twist.linear.norm_squared() + motion.recoil;
+                motion.recoil = if foreseen { speed2.sqrt() } else { 0.0 };
+            }
+        }
     }
 
     /// Bounds of a body over a step of `dt`. `None` when it has no coat.

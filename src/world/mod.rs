@@ -98,6 +98,12 @@ pub struct Link {
 }
 
 impl Link {
+    /// Whether joints of its host hold it.
+    pub(crate) fn is_held(&self) -> bool {
+        let said = self.desc.constrained || self.articulated;
+        self.desc.kind == Kind::Host && (said || self.mirror.is_doubtful())
+    }
+
     /// One that nothing has happened to yet.
     pub(crate) fn new(desc: LinkDesc, body: u32) -> Self {
         Link {

@@ -74,13 +74,7 @@ impl Rules<'_> {
         let mut step = Step { motions, island, candidates, articulations, settings: &self.settings, work, team };
         // What is past the most that its contacts carry is held by the implicit response alone, whoever forces another.
         let (substeps, left) = match response {
-            Response::Explicit => {
-                if explicit::step(&mut step, dt) {
-                    (1, 0.0)
-                } else {
-                    (0, dt)
-                }
-            }
+            Response::Explicit => explicit::step(&mut step, dt),
             Response::Implicit => (0, dt),
             Response::Auto | Response::Substepped => substepped::step(&mut step, dt, *substeps as u32),
         };
@@ -291,9 +285,8 @@ impl World {
             && let Some(log) = self.log.get_mut()
         {
             let text = format!(
-                "the stiffest contact asks for {:.0} sub-steps, max_substeps allows {}: the step was implicit; raise max_substeps, \
-                 or lower stiffness_scale or dt",
-                short, most
+                "the stiffest contact asks for {short:.0} sub-steps, max_substeps allows {most}: the step was implicit; \
+                 raise max_substeps, or lower stiffness_scale or dt"
             );
             log(LogLevel::Warning, &text);
         }
@@ -337,11 +330,7 @@ impl World {
                 return (response, true);
             }
         }
-        let held = links().any(|link| {
-            let constrained = link.desc.constrained || link.articulated;
-            let host = link.desc.kind == Kind::Host && (constrained || link.mirror.is_doubtful());
-            host || self.bodies[link.body as usize].stacked > 0
-        });
+        let held = links().any(|link| link.is_held() || self.bodies[link.body as usize].stacked > 0);
         let stiff = island.springs.iter().any(|spring| spring.rate2(&state.motions).sqrt() * dt > STIFF);
         // Substances have pushed by now.
         let pushed = || island.links.iter().any(|link| state.motions[*link as usize].touched);

@@ -278,33 +278,6 @@ impl World {
         }
     }
 
-    /// How fast the links of those that may bounce in sub-steps can be in directions they do not move in yet: as they come,
-    /// and by what their contacts hold, over the mass of the body.
-    fn foresee_bounces(&self, state: &mut Stepping) {
-        let bounces = |body: &super::Body| match body.desc.response {
-            Response::Auto => matches!(self.desc.response, Response::Auto | Response::Substepped),
-            own => own == Response::Substepped,
-        };
-        for candidate in state.candidates.iter().filter(|candidate| candidate.memory.held > 0.0) {
-            let [a, b] = candidate.memory.ids.map(|id| self.bodies.get(BodyId::from_raw(id)).ok());
-            for body in [a, b.filter(|_| candidate.bodies[0] != candidate.bodies[1])].into_iter().flatten() {
-                let moving = || body.links.iter().filter(|link| state.motions[**link as usize].is_movable());
-                let mass: f64 = moving().map(|link| 1.0 / state.motions[*link as usize].inverse_mass()).sum();
-                for link in body.links.iter().filter(|_| mass > 0.0) {
-                    state.motions[*link as usize].recoil += 2.0 * candidate.memory.held / mass;
-                }
-            }
-        }
-        for body in self.bodies.indices().map(|slot| &self.bodies[slot]).filter(|body| !body.is_asleep()) {
-            for link in &body.links {
-                let motion = &mut state.motions[*link as usize];
-                let foreseen = motion.is_movable() && bounces(body);
-                let speed2 = motion.twist.linear.norm_squared() + motion.recoil;
-                motion.recoil = if foreseen { speed2.sqrt() } else { 0.0 };
-            }
-        }
-    }
-
     /// Pairs of bodies whose bounds meet and that may touch.
     fn find_candidates(&mut self, state: &mut Stepping, dt: f64, team: &Team) {
         self.find_bounds(state, dt);
