@@ -308,16 +308,17 @@ impl Team<'_> {
         });
     }
 
-    /// Calls `work` for each item at one of `places`, which must be in ascending order, each once.
-    pub fn each_at<T: Send>(&self, items: &mut [T], places: &[u32], block: usize, work: impl Fn(&mut T) + Sync) {
-        assert!(places.is_sorted_by(|a, b| a < b), "each place once, in order");
-        assert!(places.last().is_none_or(|last| (*last as usize) < items.len()), "places within the items");
+    /// Calls `work` with the number of each piece, and the piece: the first goes up to the first of `ends`, which are in
+    /// order, the next from there to the second.
+    pub fn each_piece<T: Send>(&self, items: &mut [T], ends: &[usize], work: impl Fn(usize, &mut [T]) + Sync) {
+        assert!(ends.is_sorted() && ends.last().is_none_or(|end| *end <= items.len()), "pieces in order, of the items");
         let all = Shared(items.as_mut_ptr());
-        self.each(places.len(), block, |range| {
-            for place in &places[range] {
-                // SAFETY: within the slice, which is borrowed until `each` is done; no place comes twice, so that
-                // nobody else has this item.
-                work(unsafe { &mut *all.at(*place as usize) });
+        self.each(ends.len(), ends.len().div_ceil(self.workers()).max(1), |range| {
+            for piece in range {
+                let (first, end) = (if piece == 0 { 0 } else { ends[piece - 1] }, ends[piece]);
+                // SAFETY: within the slice, which is borrowed until `each` is done; pieces do not overlap, and ranges
+                // neither, so that nobody else has these items.
+                work(piece, unsafe { std::slice::from_raw_parts_mut(all.at(first), end - first) });
             }
         });
     }
@@ -389,11 +390,19 @@ mod tests {
                         let mut items = vec![0u32; count];
                         team.each_mut(&mut items, block, |index, item| *item += index as u32);
                         assert!(items.iter().enumerate().all(|(index, item)| *item == index as u32));
-                        let places: Vec<u32> = (0..count as u32).filter(|index| index % 3 == 1).collect();
-                        team.each_at(&mut items, &places, block, |item| *item = u32::MAX);
-                        assert_eq!(items.iter().filter(|item| **item == u32::MAX).count(), places.len());
                     }
                 }
+            });
+        }
+    }
+
+    #[test]
+    fn pieces_are_worked_at_whole() {
+        for workers in [1, 2, 5] {
+            Team::with(Some(&mut Threads(workers)), |team| {
+                let mut items = [9u32; 12];
+                team.each_piece(&mut items, &[0, 3, 3, 4, 10], |piece, items| items.fill(piece as u32));
+                assert_eq!(items, [1, 1, 1, 3, 4, 4, 4, 4, 4, 4, 9, 9]);
             });
         }
     }
@@ -465,11 +474,5 @@ mod tests {
             });
             assert_eq!(done, 10);
         }
-    }
-
-    #[test]
-    #[should_panic(expected = "each place once")]
-    fn places_that_come_twice_are_refused() {
-        Team::alone().each_at(&mut [0; 4], &[1, 1], 1, |_| {});
     }
 }

@@ -379,3 +379,72 @@ fn a_tumbling_capsule_and_blended_coats_settle_without_a_gain() {
         assert!(most < 1.001 && state.pose.position.z > 0.05 && state.twist.linear.norm() < 1.2);
     }
 }
+
+/// Nothing moves and nothing pulls: what the forces leave that cancel each other is rounding, and not to be solved for.
+#[test]
+fn what_is_clamped_without_gravity_is_at_rest_at_once() {
+    for (index, modulus) in [1e4, 1e6, 1e9].into_iter().enumerate() {
+        for tilt in 0..8 {
+            let mut world = World::new(WorldDesc { response: Response::Implicit, ..WorldDesc::default() }).unwrap();
+            let turn = Quat::from_scaled_axis(Vec3::new(0.3, 0.2, 0.1) * f64::from(tilt));
+            let depth = 0.03;
+            for side in [-1.0, 1.0] {
+                let plane = Coat::new(&[Shape::Plane { point: Vec3::zeros(), normal: Vec3::z() * -side }], 0.1);
+                let pose = Pose { position: turn * Vec3::z() * (side * (RADIUS - depth + 0.1)), rotation: turn };
+                plane.add(
+                    &mut world,
+                    BodyDesc { rigid: true, ..flesh(modulus) },
+                    LinkDesc { pose, ..LinkDesc::default() },
+                );
+            }
+            let mut link = ball_link(1.0, Vec3::zeros());
+            link.pose.rotation = turn;
+            let ball = add_ball(&mut world, &BodyDesc { friction: 0.3, ..flesh(modulus) }, link);
+            for _ in 0..20 {
+                world.step(DT).unwrap();
+                let counters = world.counters();
+                assert_eq!(counters.implicit_splits, 0, "modulus {modulus:.0e}, tilt {tilt}");
+            }
+            let forces: Vec<f64> = world.contacts().iter().map(|contact| contact.force.norm()).collect();
+            let speed = world.link_state(ball).unwrap().twist.linear.norm();
+            let exact = force_at(modulus, depth);
+            if tilt == 0 {
+                println!("{index}: {forces:.6?} N, exactly {exact:.6}; {speed:.1e} m/s");
+            }
+            assert!(forces.len() == 2 && forces.iter().all(|force| (force / exact - 1.0).abs() < 1e-2) && speed < 1e-9);
+        }
+    }
+}
+
+/// Who looks from a train sees the same: the accuracy is that of what changes, not of how fast all goes.
+#[test]
+fn a_crate_on_a_fast_truck_rests_as_on_one_that_stands() {
+    for speed in [0.0, 1000.0] {
+        let mut world = world(Response::Implicit);
+        let twist = Twist { linear: Vec3::x() * speed, angular: Vec3::zeros() };
+        let half = Vec3::new(2.0, 1.0, 0.5);
+        let truck = Coat::cuboid(half - Vec3::repeat(0.05), 0.05);
+        let desc = BodyDesc { friction: 0.5, ..flesh(1e6) };
+        let link = LinkDesc {
+            kind: Kind::Rigid,
+            mass: 1e4,
+            inertia: box_inertia(1e4, half),
+            pose: Pose::at(0.0, 0.0, -0.5),
+            twist,
+            gravity_scale: 0.0,
+            ..LinkDesc::default()
+        };
+        truck.add(&mut world, desc.clone(), link);
+        let mut link = ball_link(0.01, Vec3::new(0.0, 0.0, RADIUS - 1e-4));
+        link.twist = twist;
+        let part = add_ball(&mut world, &desc, link);
+        let mut fastest = 0.0f64;
+        for _ in 0..60 {
+            world.step(DT).unwrap();
+            let state = world.link_state(part).unwrap();
+            fastest = fastest.max((state.twist.linear - twist.linear).norm());
+        }
+        println!("at {speed} m/s the part moves by {fastest:.1e} m/s at most");
+        assert!(fastest < 1e-2);
+    }
+}

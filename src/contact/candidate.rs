@@ -142,6 +142,11 @@ impl Candidate {
         self.memory.standing.velocity(&self.pair, link, &motions[link as usize], h)
     }
 
+    /// The patches that press, with what they came to.
+    pub fn pressing(&self) -> impl Iterator<Item = (&Patch, &Sums)> {
+        self.surface.patches.iter().zip(&self.loads).filter(|(_, load)| load.force != Vec3::zeros())
+    }
+
     /// Elastic energy in the compression of the present surface, at most: that of a force which grows in proportion to
     /// the overlap; others hold less \[J\].
     pub fn elastic_energy(&self) -> f64 {

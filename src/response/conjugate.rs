@@ -21,7 +21,10 @@ use crate::field::lanes::{Dispatch, Kernel};
 use crate::team::Team;
 
 /// Rows that one worker has: always as many, so that the bits do not depend on who works.
-const CHUNK: usize = 64;
+const CHUNK: usize = 128;
+
+/// Couplings that are scaled in one go.
+const SCALED: usize = 32;
 
 /// The system: each row of blocks has the one on the diagonal, and its couplings on both sides of it.
 #[derive(Debug, Default)]
@@ -30,6 +33,10 @@ pub struct Blocks {
     entries: Vec<Block>,
     /// The other row of each.
     others: Vec<u32>,
+    /// Where those of each row end.
+    ends: Vec<u32>,
+    /// Which row each of the matrix is.
+    order: Vec<u32>,
     matrix: Matrix,
     rows: Vec<Row>,
     /// `t` of each row that another chunk reads.
@@ -37,7 +44,8 @@ pub struct Blocks {
     sums: Vec<Sums>,
 }
 
-/// The scaled matrix without its diagonal; what couples rows of one chunk with its sign turned.
+/// The scaled matrix without its diagonal, its rows in the order of solving; what couples rows of one chunk with its sign
+/// turned.
 #[derive(Debug, Default)]
 struct Matrix {
     /// Where each class of each row's couplings ends.
@@ -160,6 +168,7 @@ impl Block {
     }
 
     /// The product of the transpose with `x`.
+    #[inline(always)]
     fn transposed_product(&self, x: &Column) -> Column {
         let mut product = Column::default();
         for (sum, column) in product.0.iter_mut().zip(&self.0) {
@@ -171,6 +180,7 @@ impl Block {
     }
 
     /// `left self rightᵀ` times a factor, where `right` has nothing above its diagonal.
+    #[inline(always)]
     fn between(&self, left: &Self, right: &Self, factor: f64) -> Self {
         let mut sums = Self::default();
         for (middle, (column, weights)) in self.0.iter().zip(&right.0).enumerate() {
@@ -193,7 +203,7 @@ fn joined([sum, other]: [Column; 2]) -> Column {
 struct Row {
     /// Inverse of its own block's Cholesky factor.
     scale: Block,
-    /// Of the unknowns times `(1 + L)ᵀ`.
+    /// The unknowns, scaled and times `(1 + L)ᵀ`; in the end the unknowns.
     y: Column,
     residual: Column,
     direction: Column,
@@ -212,10 +222,7 @@ impl Blocks {
     /// No rows.
     pub fn clear(&mut self) {
         self.others.clear();
-        self.matrix.ends.clear();
-        self.matrix.sources.clear();
-        self.matrix.owners.clear();
-        self.matrix.others.clear();
+        self.ends.clear();
     }
 
     /// Couples the row that is being made with another.
@@ -225,29 +232,42 @@ impl Blocks {
 
     /// Ends the row that is being made.
     pub fn end_row(&mut self) {
-        let Self { others, matrix, .. } = self;
-        let row = matrix.ends.len();
-        let chunk = row / CHUNK * CHUNK;
-        let range = matrix.sources.len()..others.len();
-        debug_assert!(others[range.clone()].iter().all(|other| *other as usize != row), "row {row} with itself");
-        let is_near = |other: u32| (chunk..chunk + CHUNK).contains(&(other as usize));
-        let ends = [Class::Lower, Class::Upper, Class::Far].map(|class| {
-            for source in range.clone() {
-                let other = others[source];
-                let belongs = match class {
-                    Class::Lower => is_near(other) && (other as usize) < row,
-                    Class::Upper => is_near(other) && other as usize > row,
-                    Class::Far => !is_near(other),
-                };
-                if belongs {
-                    matrix.sources.push(source as u32);
-                    matrix.others.push(other);
+        self.ends.push(self.others.len() as u32);
+    }
+
+    /// Arranges the rows in the `order` in which they are solved for; `places` has the place of each in it.
+    pub fn arrange(&mut self, order: &[u32], places: &[u32]) {
+        let Self { others, ends, matrix, .. } = self;
+        self.order.clear();
+        self.order.extend_from_slice(order);
+        matrix.ends.clear();
+        matrix.sources.clear();
+        matrix.owners.clear();
+        matrix.others.clear();
+        for (place, row) in order.iter().enumerate() {
+            let begin = if *row == 0 { 0 } else { ends[*row as usize - 1] };
+            let sources = begin..ends[*row as usize];
+            let chunk = place / CHUNK * CHUNK;
+            let is_near = |other: usize| (chunk..chunk + CHUNK).contains(&other);
+            let ends = [Class::Lower, Class::Upper, Class::Far].map(|class| {
+                for source in sources.clone() {
+                    let other = places[others[source as usize] as usize] as usize;
+                    debug_assert!(other != place, "row {row} with itself");
+                    let belongs = match class {
+                        Class::Lower => is_near(other) && other < place,
+                        Class::Upper => is_near(other) && other > place,
+                        Class::Far => !is_near(other),
+                    };
+                    if belongs {
+                        matrix.sources.push(source);
+                        matrix.others.push(other as u32);
+                    }
                 }
-            }
-            matrix.sources.len() as u32
-        });
-        matrix.owners.resize(matrix.sources.len(), row as u32);
-        matrix.ends.push(ends);
+                matrix.sources.len() as u32
+            });
+            matrix.owners.resize(matrix.sources.len(), place as u32);
+            matrix.ends.push(ends);
+        }
     }
 
     /// The blocks of all couplings, in the order in which they were made.
@@ -267,10 +287,8 @@ impl Blocks {
         most: usize,
         team: &Team,
     ) -> bool {
-        let Self { entries, matrix, rows, shared, sums, .. } = self;
+        let Self { entries, order, matrix, rows, shared, sums, .. } = self;
         let count = diagonal.len();
-        let (alone, few) = (Team::alone(), entries.len() + count < WORTH_SHARING);
-        let team = if few { &alone } else { team };
         let dispatch = Dispatch::best();
         rows.resize(count, Row::default());
         shared.resize(count.div_ceil(CHUNK), [Column::default(); CHUNK]);
@@ -278,14 +296,16 @@ impl Blocks {
         if fresh {
             team.each_mut(rows, team.share(count, 1), |index, row| {
                 let none = || Block([Column([f64::NAN; 8]); BLOCK]);
-                row.scale = Block::inverse_factor_of(&diagonal[index]).unwrap_or_else(none);
+                row.scale = Block::inverse_factor_of(&diagonal[order[index] as usize]).unwrap_or_else(none);
             });
             matrix.scale(entries, rows, team);
         }
+        let (alone, few) = (Team::alone(), entries.len() + count < WORTH_SHARING);
+        let team = if few { &alone } else { team };
         let matrix = &*matrix;
-        let right = &*x;
+        let (right, order) = (&*x, &**order);
         team.each_row(rows, CHUNK, shared, |chunk, rows, shared| {
-            dispatch.run(Begin { part: Part { matrix, first: chunk * CHUNK, rows }, right, shared });
+            dispatch.run(Begin { part: Part { matrix, first: chunk * CHUNK, rows }, order, right, shared });
         });
         let (mut first_size, mut last_size, mut length) = (0.0, f64::INFINITY, f64::INFINITY);
         for iteration in 0..=most {
@@ -313,10 +333,10 @@ impl Blocks {
             });
         }
         team.each_row(rows, CHUNK, shared, |chunk, rows, shared| {
-            Part { matrix, first: chunk * CHUNK, rows }.turn_back(|row| row.y, shared);
+            dispatch.run(End { part: Part { matrix, first: chunk * CHUNK, rows }, shared });
         });
-        for (x, row) in x.chunks_exact_mut(BLOCK).zip(rows.iter()) {
-            x.copy_from_slice(&row.scale.transposed_product(&row.turned).0[..BLOCK]);
+        for (row, Row { y, .. }) in order.iter().zip(rows.iter()) {
+            x[*row as usize * BLOCK..][..BLOCK].copy_from_slice(&y.0[..BLOCK]);
         }
         true
     }
@@ -327,10 +347,9 @@ impl Matrix {
     fn scale(&mut self, entries: &[Block], rows: &[Row], team: &Team) {
         let Self { ends, sources, owners, others, entries: scaled } = self;
         scaled.resize(sources.len(), Block::default());
-        team.each_mut(scaled, team.share(sources.len(), 1), |place, scaled| {
-            let (row, other) = (owners[place] as usize, others[place] as usize);
-            let sign = if place < ends[row][Class::Upper as usize] as usize { -1.0 } else { 1.0 };
-            *scaled = entries[sources[place] as usize].between(&rows[row].scale, &rows[other].scale, sign);
+        let (dispatch, count) = (Dispatch::best(), scaled.len().div_ceil(SCALED));
+        team.each_row(scaled, SCALED, &mut vec![(); count], |number, scaled, ()| {
+            dispatch.run(Scale { scaled, first: number * SCALED, ends, sources, owners, others, entries, rows });
         });
     }
 
@@ -379,9 +398,36 @@ impl Part<'_> {
     }
 }
 
+/// Couplings from the `first` on, scaled.
+struct Scale<'a> {
+    scaled: &'a mut [Block],
+    first: usize,
+    ends: &'a [[u32; 3]],
+    sources: &'a [u32],
+    owners: &'a [u32],
+    others: &'a [u32],
+    entries: &'a [Block],
+    rows: &'a [Row],
+}
+
+impl Kernel for Scale<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<const W: usize>(self) {
+        for (place, scaled) in (self.first..).zip(self.scaled) {
+            let (row, other) = (self.owners[place] as usize, self.others[place] as usize);
+            let is_near = place < self.ends[row][Class::Upper as usize] as usize;
+            let entry = &self.entries[self.sources[place] as usize];
+            *scaled = entry.between(&self.rows[row].scale, &self.rows[other].scale, if is_near { -1.0 } else { 1.0 });
+        }
+    }
+}
+
 /// What is left at the start, scaled and times `(1 + L)⁻¹`; and `t`.
 struct Begin<'a> {
     part: Part<'a>,
+    order: &'a [u32],
     right: &'a [f64],
     shared: &'a mut [Column],
 }
@@ -391,17 +437,37 @@ impl Kernel for Begin<'_> {
 
     #[inline(always)]
     fn run<const W: usize>(self) {
-        let Self { part, right, shared } = self;
+        let Self { part, order, right, shared } = self;
         let Part { matrix, first, .. } = part;
         for place in 0..part.rows.len() {
-            let row = first + place;
-            let scale = part.rows[place].scale;
             let mut strands = [Column::default(); 2];
-            scale.add_product(&Column::of(&right[row * BLOCK..][..BLOCK]), &mut strands);
-            matrix.add_products(row, Class::Lower, |other| &part.rows[other - first].residual, &mut strands);
-            part.rows[place] = Row { scale, residual: joined(strands), ..Row::default() };
+            let right = Column::of(&right[order[first + place] as usize * BLOCK..][..BLOCK]);
+            part.rows[place].scale.add_product(&right, &mut strands);
+            matrix.add_products(first + place, Class::Lower, |other| &part.rows[other - first].residual, &mut strands);
+            let row = &mut part.rows[place];
+            row.residual = joined(strands);
+            (row.y, row.direction, row.direction_image) = Default::default();
         }
         part.turn_back(|row| row.residual, shared);
+    }
+}
+
+/// The unknowns, unscaled.
+struct End<'a> {
+    part: Part<'a>,
+    shared: &'a mut [Column],
+}
+
+impl Kernel for End<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<const W: usize>(self) {
+        let Self { part: Part { matrix, first, rows }, shared } = self;
+        Part { matrix, first, rows: &mut *rows }.turn_back(|row| row.y, shared);
+        for row in rows {
+            row.y = row.scale.transposed_product(&row.turned);
+        }
     }
 }
 
@@ -504,6 +570,11 @@ mod tests {
             envelope.add(i, i, &block);
             diagonal.push(block);
         }
+        // From both ends to the middle.
+        let order: Vec<u32> = (0..count as u32 / 2).flat_map(|i| [i, count as u32 - 1 - i]).collect();
+        let mut places = vec![0; count];
+        (0u32..).zip(&order).for_each(|(place, row)| places[*row as usize] = place);
+        blocks.arrange(&order, &places);
         blocks.entries().fill(Block::of(&-spring));
         let right: Vec<f64> = (0..count * BLOCK).map(|i| ((i * 7) % 11) as f64 - 5.0).collect();
         let (mut direct, mut iterated) = (right.clone(), right);

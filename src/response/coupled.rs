@@ -6,12 +6,11 @@
 
 use nalgebra::{Matrix6, Vector6};
 
+use super::bundle::{Bundle, Taker};
 use super::conjugate::{Block, Blocks};
 use super::envelope::{BLOCK, Envelope};
-use super::group::{Group, Member, Points, Push, Slope, relative};
-use super::grouping::Bundle;
+use super::group::{Member, relative};
 use super::joined::Joined;
-use super::springs::Tie;
 use crate::base::{Inertia, Motion};
 use crate::math::{Mat3, Quat, Twist, Vec3, Wrench, rotate_tensor};
 use crate::team::Team;
@@ -19,26 +18,24 @@ use crate::team::Team;
 /// The contacts of an island at one pose.
 #[derive(Debug, Default)]
 pub struct Coupled {
-    /// All groups.
-    pub groups: Vec<Group>,
-    /// Points of all groups.
-    pub points: Points,
-    /// Springs.
-    pub ties: Vec<Tie>,
-    /// Members of all groups, then of all ties.
-    pub members: Vec<Member>,
+    /// Contacts and springs, in the first `count` of them.
+    bundles: Vec<Bundle>,
+    count: usize,
     /// What articulations add to the inertia of the links.
     pub joined: Joined,
     masses: Vec<Matrix6<f64>>,
     mobilities: Vec<Matrix6<f64>>,
+    /// The links with unknowns, and the row of each in the system, by slot.
+    links: Vec<u32>,
     blocks: Vec<u32>,
+    /// The rows in the order in which they are solved for, where neighbours are near each other, and the place of each.
+    order: Vec<u32>,
+    places: Vec<u32>,
     first: Vec<u32>,
     /// The system is too wide for a factor.
     wide: bool,
     matrix: Envelope,
     blocks_of_matrix: Blocks,
-    /// The part of each group, then of each tie, in the system.
-    parts: Vec<Part>,
     /// The members that are each row of blocks, in the order of the parts, and where each row's begin.
     roles: Vec<Role>,
     starts: Vec<u32>,
@@ -48,35 +45,45 @@ pub struct Coupled {
     residual: Vec<f64>,
     base: Vec<f64>,
     step: Vec<f64>,
+    /// The step in the order of solving.
+    ordered: Vec<f64>,
 }
 
-/// The part of a group or a tie in the system.
-#[derive(Clone, Copy, Debug, Default)]
-struct Part {
-    /// On b, about the group's centre.
-    push: Push,
-    slope: Slope,
-    /// The slope is more than nothing.
-    resists: bool,
+/// What [`Coupled::solve`] works on.
+#[derive(Clone, Copy)]
+pub struct Problem<'a> {
+    /// The velocities at the start of the step.
+    pub start: &'a [f64],
+    /// Those at its end without contact.
+    pub free: &'a [f64],
+    /// Those of links without unknowns.
+    pub fixed: &'a [Motion],
+    /// Length of the step \[s\].
+    pub h: f64,
+    /// Who works at it.
+    pub team: &'a Team<'a>,
 }
 
-/// A group or a tie in which a row's link takes part.
+/// A group or a tie in which a row's link takes part: the bundle, and the places in it of the part, of the member, and of
+/// the first and the last-plus-one of all that take part in it.
 #[derive(Clone, Copy, Debug, Default)]
 struct Role {
+    bundle: u32,
     part: u32,
     member: u32,
+    takers: (u32, u32),
 }
 
 /// A block off the diagonal.
 #[derive(Clone, Copy, Debug)]
 enum Coupling {
     /// How a member of a group or a tie answers to another.
-    Part { part: u32, members: [u32; 2] },
+    Part { role: Role, other: u32 },
     /// The inertia of an articulation, by the number of its entry.
     Joined(u32),
 }
 
-/// Least parts, rows and blocks that a worker takes in one go.
+/// Least blocks that a worker takes in one go.
 const GROUPS: usize = 16;
 
 /// Steps of Newton's method in one solve.
@@ -88,7 +95,15 @@ const MOST_LOOKS: usize = 12;
 /// Slope along a step, over the slope at its start, that counts as lowest.
 const FLAT: f64 = 0.2;
 
-/// Residual over the kinetic energy at work, both squared, at which nothing is left to solve.
+/// Square of what rounding leaves of sums, over the square of what is summed up.
+const ROUNDING: f64 = 1e-29;
+
+/// Residual over the kinetic energy at work, both squared, that will do where Newton's method gets no further, or not in
+/// so many steps.
+const STALLED: f64 = 1e-16;
+const TIRED: f64 = 1e-10;
+
+/// The same at which nothing is left to solve.
 const SOLVED: f64 = 1e-18;
 
 /// The same with springs: what the residual leaves is a velocity, which stretches a stiff one.
@@ -117,66 +132,67 @@ const MOST_GRADIENTS: usize = 400;
 const NONE: u32 = u32::MAX;
 
 impl Coupled {
-    /// Sets the links with unknowns, in the order of the system, with their inertia at the start of the step.
-    pub fn set_links(&mut self, links: &[u32], motions: &[Motion]) {
-        self.masses.clear();
-        self.mobilities.clear();
-        self.blocks.clear();
-        self.blocks.resize(motions.len(), NONE);
+    /// Sets the links with unknowns, with their inertia at the start of the step, and the order in which they are to be
+    /// solved for. The system has them in their own order, so that who puts contacts together puts them together with
+    /// the links that they are on.
+    pub fn set_links(&mut self, links: &[u32], order: &[u32], motions: &[Motion], team: &Team) {
+        let Self { masses, mobilities, blocks, places, .. } = self;
+        self.order.clear();
+        self.order.extend_from_slice(order);
+        places.resize(order.len(), 0);
+        for (place, row) in order.iter().enumerate() {
+            places[*row as usize] = place as u32;
+        }
+        blocks.resize(motions.len().max(blocks.len()), NONE);
+        // An island may be small, and the world large.
+        for link in self.links.drain(..) {
+            blocks[link as usize] = NONE;
+        }
         for (block, link) in links.iter().enumerate() {
-            self.blocks[*link as usize] = block as u32;
-            let (mass, mobility) = inertia(&motions[*link as usize]);
-            self.masses.push(mass);
-            self.mobilities.push(mobility);
+            blocks[*link as usize] = block as u32;
         }
-    }
-
-    /// Forgets groups and ties.
-    pub fn clear(&mut self) {
-        self.groups.clear();
-        self.points.clear();
-        self.ties.clear();
-        self.members.clear();
-    }
-
-    /// Leaves the patches, but not the walls, a part of their stiffness.
-    pub fn soften(&mut self, part: f64) {
-        for group in self.groups.iter().filter(|group| group.patch.is_some()) {
-            self.points.soften(group.points.0..group.points.1, part);
-        }
-    }
-
-    /// Adds the groups of a bundle.
-    pub fn append(&mut self, bundle: &Bundle) {
-        let (points, members) = (self.points.count(), self.members.len());
-        let behind = |range: (usize, usize), first: usize| (range.0 + first, range.1 + first);
-        self.groups.extend(bundle.groups.iter().map(|group| Group {
-            points: behind(group.points, points),
-            members: behind(group.members, members),
-            ..*group
-        }));
-        self.points.append(&bundle.points);
-        self.members.extend_from_slice(&bundle.members);
-    }
-
-    /// Sets the velocities at which the contact surfaces were evaluated in this round.
-    pub fn set_base(&mut self, x: &[f64], fixed: &[Motion], team: &Team) {
-        let mut groups = std::mem::take(&mut self.groups);
-        let block = team.share(groups.len(), GROUPS);
-        team.each_mut(&mut groups, block, |_, group| {
-            if !group.looked {
-                group.base = self.relative_of(group.members, x, fixed);
-            }
+        self.links.extend_from_slice(links);
+        masses.resize(links.len(), Matrix6::zeros());
+        mobilities.resize(links.len(), Matrix6::zeros());
+        team.each_row(masses, 1, mobilities, |block, mass, mobility| {
+            (mass[0], *mobility) = inertia(&motions[links[block] as usize]);
         });
-        self.groups = groups;
     }
 
-    /// The relative velocity over some members for the unknowns `x`; `fixed` has the velocities of links without unknowns.
-    pub fn relative_of(&self, members: (usize, usize), x: &[f64], fixed: &[Motion]) -> Twist {
-        relative(&self.members[members.0..members.1], |link| match self.blocks[link as usize] {
-            NONE => fixed[link as usize].twist,
-            block => twist_of(x, block),
-        })
+    /// Has `count` bundles put together anew, by their numbers, for surfaces and springs that were evaluated where the
+    /// unknowns `x` lead; `fixed` has the velocities of links without unknowns.
+    pub fn put_together(
+        &mut self,
+        count: usize,
+        x: &[f64],
+        fixed: &[Motion],
+        team: &Team,
+        put: impl Fn(usize, &mut Bundle) + Sync,
+    ) {
+        self.count = count;
+        self.bundles.resize_with(count.max(self.bundles.len()), Bundle::default);
+        let velocities = Velocities { blocks: &self.blocks, x, fixed };
+        team.each_mut(&mut self.bundles[..count], 1, |number, bundle| {
+            bundle.clear();
+            put(number, bundle);
+            bundle.set_base(|link| velocities.of(link));
+            bundle.find_takers(|link| Some(velocities.blocks[link as usize]).filter(|row| *row != NONE));
+        });
+    }
+
+    /// The bundles.
+    pub fn bundles(&self) -> &[Bundle] {
+        &self.bundles[..self.count]
+    }
+
+    /// The bundles, for changes.
+    pub fn bundles_mut(&mut self) -> &mut [Bundle] {
+        &mut self.bundles[..self.count]
+    }
+
+    /// The velocities of all links for the unknowns `x`; `fixed` has those of links without unknowns.
+    pub fn velocities<'a>(&'a self, x: &'a [f64], fixed: &'a [Motion]) -> Velocities<'a> {
+        Velocities { blocks: &self.blocks, x, fixed }
     }
 
     /// The velocities of a link in the unknowns `x`, if it has any.
@@ -190,55 +206,76 @@ impl Coupled {
         block != NONE && !self.joined.range_of(block as usize).is_empty()
     }
 
-    /// What each group came to at the unknowns that [`solve`](Self::solve) found.
-    pub fn pushes(&self) -> impl Iterator<Item = (&Group, &Push)> + Clone {
-        self.groups.iter().zip(self.parts.iter().map(|part| &part.push))
-    }
-
-    /// Solves for the velocities at the end of the step, in place; `free` has those without contact, `fixed` those of
-    /// the links without unknowns. False when it does not get there.
+    /// Solves for the velocities at the end of the step, in place. False when it does not get there.
     ///
     /// But for the pressure's part in friction, the residual is the gradient of a convex function. Newton's method
     /// overshoots its lowest point where a slip comes to rest, so each step goes to the lowest point along it.
     ///
     /// One step at least is taken, however small the residual: so what lies comes to rest in the course of time. After
-    /// it a residual of `accuracy`, over the momentum at work, will do.
-    pub fn solve(&mut self, x: &mut [f64], free: &[f64], fixed: &[Motion], h: f64, accuracy: f64, team: &Team) -> bool {
+    /// it a residual of `accuracy` will do, over the momentum that contacts and what pulls bring: not over that which is
+    /// there, which only depends on who looks; nor over the residual at the start, since that of a stiff contact which the
+    /// guess closes is out of all proportion.
+    pub fn solve(&mut self, x: &mut [f64], problem: &Problem, accuracy: f64) -> bool {
         self.shape();
-        self.assemble(x, free, fixed, h, true, team);
+        self.assemble(x, problem, true);
         let mut norm = self.norm(&self.residual);
-        let scale = norm + self.energy(x) + self.energy(free);
-        let (solved, enough) =
-            if self.ties.is_empty() { (SOLVED, accuracy * accuracy) } else { (SOLVED_TIES, SOLVED_TIES) };
-        if norm <= solved * scale {
+        let pull = self.energy(problem.free, problem.start);
+        // What forces leave that cancel each other, and velocities.
+        let rounding =
+            ROUNDING * (self.size_of_forces(problem.h) + self.energy(x, &[]) + self.energy(problem.free, &[]));
+        let (solved, part) = if self.bundles().iter().all(|bundle| bundle.ties.is_empty()) {
+            (SOLVED, accuracy * accuracy)
+        } else {
+            (SOLVED_TIES, SOLVED_TIES)
+        };
+        let mut work = self.energy(x, problem.free) + pull;
+        if norm <= solved * work + rounding {
             return true;
         }
-        let enough = enough * scale;
         let (mut last, mut fresh) = (f64::INFINITY, true);
         for _ in 0..MOST_STEPS {
             if !fresh && norm > QUICK * last {
-                self.assemble(x, free, fixed, h, true, team);
+                self.assemble(x, problem, true);
                 fresh = true;
             }
             self.step.clone_from(&self.residual);
-            let needed = 0.3 * (enough / norm).sqrt();
+            let needed = 0.3 * ((part * work + rounding) / norm).sqrt();
             let lost = if last.is_finite() { LACK * (norm / last).sqrt() } else { 0.0 };
             let left = needed.max(lost).clamp(GRADIENTS.0, GRADIENTS.1);
-            if !self.solve_step(left, fresh, team) {
+            if !self.solve_step(left, fresh, problem.team) {
                 return false;
             }
-            fresh = false;
             self.base.clear();
             self.base.extend_from_slice(x);
+            self.go_lowest(x, problem);
             last = norm;
-            self.go_lowest(x, free, fixed, h, team);
             norm = self.norm(&self.residual);
-            // Sums of contact forces round off.
-            if norm <= enough || norm > 0.9 * last && norm <= 1e-16 * scale {
+            work = self.energy(x, problem.free) + pull;
+            let stalls = fresh && norm > 0.9 * last;
+            if norm <= part * work + rounding || stalls && norm <= STALLED * work + 1e4 * rounding {
                 return true;
             }
+            fresh = false;
         }
-        norm <= 1e-10 * scale
+        norm <= TIRED * work + 1e4 * rounding
+    }
+
+    /// Square of the size of the forces that act on the links, together with those that they cancel: twice the kinetic
+    /// energy that they would bring in `h` seconds.
+    fn size_of_forces(&self, h: f64) -> f64 {
+        let of_row = |row: usize| {
+            let (mut force, mut torque) = (0.0, 0.0);
+            for role in &self.roles[self.starts[row] as usize..self.starts[row + 1] as usize] {
+                let bundle = &self.bundles[role.bundle as usize];
+                let member = &bundle.members[role.member as usize];
+                let size = bundle.parts[role.part as usize].push.all.force.norm() * (h * member.weight);
+                force += size.abs();
+                torque += size.abs() * member.arm.norm();
+            }
+            let mobility = &self.mobilities[row];
+            force * force * mobility[(0, 0)] + torque * torque * mobility.fixed_view::<3, 3>(3, 3).trace()
+        };
+        (0..self.masses.len()).map(of_row).sum()
     }
 
     /// Solves for a step; with the matrix of the last one unless it is `fresh`.
@@ -246,11 +283,18 @@ impl Coupled {
         if self.wide {
             return self.blocks_of_matrix.solve(&self.diagonal, fresh, &mut self.step, left, MOST_GRADIENTS, team);
         }
-        let definite = !fresh || self.matrix.factor();
-        if definite {
-            self.matrix.solve(&mut self.step);
+        if fresh && !self.matrix.factor() {
+            return false;
         }
-        definite
+        let Self { order, step, ordered, .. } = self;
+        let (step, _) = step.as_chunks_mut::<BLOCK>();
+        ordered.clear();
+        ordered.extend(order.iter().flat_map(|row| step[*row as usize]));
+        self.matrix.solve(ordered);
+        for (row, part) in order.iter().zip(ordered.chunks_exact(BLOCK)) {
+            step[*row as usize].copy_from_slice(part);
+        }
+        true
     }
 
     fn put_step(&self, x: &mut [f64], part: f64) {
@@ -260,7 +304,7 @@ impl Coupled {
     }
 
     /// Takes the step to where the slope along it has fallen to a small part, with the residual there.
-    fn go_lowest(&mut self, x: &mut [f64], free: &[f64], fixed: &[Motion], h: f64, team: &Team) {
+    fn go_lowest(&mut self, x: &mut [f64], problem: &Problem) {
         let along = |residual: &[f64], step: &[f64]| -> f64 { residual.iter().zip(step).map(|(r, s)| r * s).sum() };
         let start = along(&self.residual, &self.step);
         let (mut low, mut slope_low) = (0.0, start);
@@ -268,7 +312,7 @@ impl Coupled {
         let mut part = 1.0;
         for _ in 0..MOST_LOOKS {
             self.put_step(x, part);
-            self.assemble(x, free, fixed, h, false, team);
+            self.assemble(x, problem, false);
             let slope = along(&self.residual, &self.step);
             // Nearly all steps are good as a whole.
             if slope.abs() <= FLAT * start || slope >= 0.0 && part == 1.0 {
@@ -286,7 +330,7 @@ impl Coupled {
             part = part.clamp(low + 0.01 * (high - low), high - 0.01 * (high - low));
         }
         self.put_step(x, part);
-        self.assemble(x, free, fixed, h, false, team);
+        self.assemble(x, problem, false);
     }
 
     /// Square of a residual's size: the kinetic energy of the velocities that it stands for, twice.
@@ -298,35 +342,34 @@ impl Coupled {
         residual.chunks_exact(BLOCK).zip(&self.mobilities).map(size).sum()
     }
 
-    /// Twice the kinetic energy of velocities.
-    fn energy(&self, x: &[f64]) -> f64 {
-        let size = |(part, mass): (&[f64], &Matrix6<f64>)| {
-            let part = Vector6::from_column_slice(part);
+    /// Twice the kinetic energy of velocities against `others`, or against none.
+    fn energy(&self, x: &[f64], others: &[f64]) -> f64 {
+        let size = |(row, (part, mass)): (usize, (&[f64], &Matrix6<f64>))| {
+            let mut part = Vector6::from_column_slice(part);
+            if let Some(other) = others.get(row * BLOCK..(row + 1) * BLOCK) {
+                part -= Vector6::from_column_slice(other);
+            }
             part.dot(&(mass * part))
         };
-        x.chunks_exact(BLOCK).zip(&self.masses).map(size).sum()
+        x.chunks_exact(BLOCK).zip(&self.masses).enumerate().map(size).sum()
     }
 
     /// Who is coupled with whom, and the shape of the matrix.
     fn shape(&mut self) {
-        let Self { groups, ties, members, joined, blocks, roles, starts, couplings, first, .. } = self;
-        let parts = groups.iter().map(|group| group.members).chain(ties.iter().map(|tie| tie.members));
+        let Self { bundles, joined, roles, starts, couplings, first, places, .. } = self;
+        let bundles = &bundles[..self.count];
         let count = self.masses.len();
-        let block = |member: usize| blocks[members[member].link as usize];
-        let taking_part = |(first, end): (usize, usize)| (first..end).filter(|member| block(*member) != NONE);
-        let members_of = |part: usize| match groups.get(part) {
-            Some(group) => group.members,
-            None => ties[part - groups.len()].members,
-        };
         first.clear();
         first.extend(0..count as u32);
         starts.clear();
         starts.resize(count + 2, 0);
-        for part in parts.clone() {
-            let lowest = taking_part(part).map(block).min().unwrap_or(NONE);
-            for row in taking_part(part).map(block) {
-                first[row as usize] = lowest.min(first[row as usize]);
-                starts[row as usize + 2] += 1;
+        for takers in bundles.iter().flat_map(Bundle::takers_by_part) {
+            let place = |taker: &Taker| places[taker.row as usize];
+            let lowest = takers.iter().map(place).min().unwrap_or(NONE);
+            for taker in takers {
+                let first = &mut first[place(taker) as usize];
+                *first = lowest.min(*first);
+                starts[taker.row as usize + 2] += 1;
             }
         }
         for row in 2..starts.len() {
@@ -334,16 +377,22 @@ impl Coupled {
         }
         roles.clear();
         roles.resize(starts[count + 1] as usize, Role::default());
-        for (index, part) in parts.enumerate() {
-            for member in taking_part(part) {
-                // Each row's start, kept one place up meanwhile, moves to the next one's.
-                let place = &mut starts[block(member) as usize + 1];
-                roles[*place as usize] = Role { part: index as u32, member: member as u32 };
-                *place += 1;
+        for (number, bundle) in bundles.iter().enumerate() {
+            let mut end = 0;
+            for all in bundle.takers_by_part() {
+                let takers = (end, end + all.len() as u32);
+                end = takers.1;
+                for Taker { part, member, row } in all {
+                    // Each row's start, kept one place up meanwhile, moves to the next one's.
+                    let place = &mut starts[*row as usize + 1];
+                    roles[*place as usize] = Role { bundle: number as u32, part: *part, member: *member, takers };
+                    *place += 1;
+                }
             }
         }
         for entry in joined.entries() {
-            first[entry.row as usize] = first[entry.row as usize].min(entry.other);
+            let [place, other] = [entry.row, entry.other].map(|row| places[row as usize]);
+            first[place as usize] = first[place as usize].min(other);
         }
         self.wide = Envelope::cost(first) > if joined.is_empty() { WIDE } else { WIDE_JOINED };
         if !self.wide {
@@ -351,15 +400,19 @@ impl Coupled {
         }
         let (wide, matrix) = (self.wide, &mut self.blocks_of_matrix);
         // Of a factor the lower half.
-        let is_needed = |row: usize, other: u32| other < row as u32 || wide && other > row as u32;
+        let is_needed = |row: usize, other: u32| {
+            let [place, other] = [row, other as usize].map(|row| places[row]);
+            other < place || wide && other > place
+        };
         couplings.clear();
         matrix.clear();
         for row in 0..count {
             for role in &roles[starts[row] as usize..starts[row + 1] as usize] {
-                for other in taking_part(members_of(role.part as usize)) {
-                    if is_needed(row, block(other)) {
-                        couplings.push(Coupling::Part { part: role.part, members: [role.member, other as u32] });
-                        matrix.couple(block(other));
+                let (first, end) = role.takers;
+                for taker in &bundles[role.bundle as usize].takers[first as usize..end as usize] {
+                    if is_needed(row, taker.row) {
+                        couplings.push(Coupling::Part { role: *role, other: taker.member });
+                        matrix.couple(taker.row);
                     }
                 }
             }
@@ -372,30 +425,25 @@ impl Coupled {
             }
             matrix.end_row();
         }
+        if wide {
+            matrix.arrange(&self.order, places);
+        }
     }
 
     /// Residual `M (x - free) - h Σ forces` and its derivative. Each part, then each row and each block is worked out by
     /// one worker.
-    fn assemble(&mut self, x: &[f64], free: &[f64], fixed: &[Motion], h: f64, with_matrix: bool, team: &Team) {
-        let mut parts = std::mem::take(&mut self.parts);
-        let count = self.groups.len() + self.ties.len();
-        parts.resize(count, Part::default());
-        team.each_mut(&mut parts, team.share(count, GROUPS), |index, part| match self.groups.get(index) {
-            Some(group) => {
-                let relative = self.relative_of(group.members, x, fixed);
-                part.push = group.respond(&self.points, &relative, h, with_matrix.then_some(&mut part.slope));
-                part.resists = part.push.all != Wrench::default();
-            }
-            None => {
-                let tie = &self.ties[index - self.groups.len()];
-                let (force, ll) = tie.respond(&self.relative_of(tie.members, x, fixed).linear, h);
-                part.push.all = Wrench { force, torque: Vec3::zeros() };
-                (part.slope, part.resists) = (Slope { ll, ..Slope::default() }, true);
-            }
+    fn assemble(&mut self, x: &[f64], problem: &Problem, with_matrix: bool) {
+        let Problem { free, fixed, h, team, .. } = *problem;
+        let velocities = Velocities { blocks: &self.blocks, x, fixed };
+        team.each_mut(&mut self.bundles[..self.count], 1, |_, bundle| {
+            bundle.respond(|link| velocities.of(link), h, with_matrix);
         });
-        self.parts = parts;
-        let Self { parts, members, joined, masses, roles, starts, couplings, diagonal, residual, .. } = self;
-        let (parts, members, masses, roles) = (&*parts, &*members, &*masses, &*roles);
+        let Self { bundles, joined, masses, roles, starts, couplings, diagonal, residual, .. } = self;
+        let (bundles, masses, roles) = (&*bundles, &*masses, &*roles);
+        let of_role = |role: &Role| {
+            let bundle = &bundles[role.bundle as usize];
+            (&bundle.parts[role.part as usize], &bundle.members[role.member as usize])
+        };
         let roles_of = |row: usize| &roles[starts[row] as usize..starts[row + 1] as usize];
         residual.resize(masses.len() * BLOCK, 0.0);
         let work_out = |row: usize, residual: &mut [f64]| {
@@ -408,8 +456,8 @@ impl Coupled {
                 sum += entry.block * change(entry.other as usize);
             }
             for role in roles_of(row) {
-                let member = &members[role.member as usize];
-                let Wrench { force, torque } = member.wrench(&parts[role.part as usize].push.all);
+                let (part, member) = of_role(role);
+                let Wrench { force, torque } = member.wrench(&part.push.all);
                 sum -= Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z) * (h * member.weight);
             }
             residual.copy_from_slice(sum.as_slice());
@@ -428,7 +476,7 @@ impl Coupled {
                 }
             }
             for role in roles_of(row) {
-                let (part, member) = (&parts[role.part as usize], &members[role.member as usize]);
+                let (part, member) = of_role(role);
                 if part.resists {
                     *sum += member.block(&part.slope, member) * h;
                 }
@@ -436,9 +484,10 @@ impl Coupled {
         });
         let couplings = &*couplings;
         let block = |index: usize| match couplings[index] {
-            Coupling::Part { part, members: [row, other] } => {
-                let part = &parts[part as usize];
-                part.resists.then(|| members[row as usize].block(&part.slope, &members[other as usize]) * h)
+            Coupling::Part { role, other } => {
+                let (part, member) = of_role(&role);
+                let other = &bundles[role.bundle as usize].members[other as usize];
+                part.resists.then(|| member.block(&part.slope, other) * h)
             }
             Coupling::Joined(entry) => Some(joined.entries()[entry as usize].block),
         };
@@ -451,22 +500,48 @@ impl Coupled {
         }
         self.matrix.zero();
         for (row, block) in diagonal.iter().enumerate() {
-            self.matrix.add(row, row, block);
+            let place = self.places[row] as usize;
+            self.matrix.add(place, place, block);
         }
         for (index, coupling) in couplings.iter().enumerate() {
             if let Some(block) = block(index) {
                 let [row, other] = match coupling {
-                    Coupling::Part { members: pair, .. } => {
-                        pair.map(|member| self.blocks[members[member as usize].link as usize])
+                    Coupling::Part { role, other } => {
+                        let members = &bundles[role.bundle as usize].members;
+                        [role.member, *other].map(|member| self.blocks[members[member as usize].link as usize])
                     }
                     Coupling::Joined(entry) => {
                         let entry = &joined.entries()[*entry as usize];
                         [entry.row, entry.other]
                     }
                 };
-                self.matrix.add(row as usize, other as usize, &block);
+                let [place, other] = [row, other].map(|row| self.places[row as usize] as usize);
+                self.matrix.add(place, other, &block);
             }
         }
+    }
+}
+
+/// The velocities of all links: those of the unknowns, and the others'.
+#[derive(Clone, Copy)]
+pub struct Velocities<'a> {
+    blocks: &'a [u32],
+    x: &'a [f64],
+    fixed: &'a [Motion],
+}
+
+impl Velocities<'_> {
+    /// Those of a link.
+    pub fn of(&self, link: u32) -> Twist {
+        match self.blocks[link as usize] {
+            NONE => self.fixed[link as usize].twist,
+            block => twist_of(self.x, block),
+        }
+    }
+
+    /// The relative velocity over some members.
+    pub fn over(&self, members: &[Member]) -> Twist {
+        relative(members, |link| self.of(link))
     }
 }
 

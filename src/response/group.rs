@@ -100,19 +100,6 @@ impl Points {
         center
     }
 
-    /// Adds the points of another.
-    pub fn append(&mut self, others: &Self) {
-        for (axis, row) in self.arm.iter_mut().enumerate() {
-            row.extend_from_slice(&others.arm[axis]);
-        }
-        for (axis, row) in self.normal.iter_mut().enumerate() {
-            row.extend_from_slice(&others.normal[axis]);
-        }
-        self.load.extend_from_slice(&others.load);
-        self.stiffness.extend_from_slice(&others.stiffness);
-        self.area.extend_from_slice(&others.area);
-    }
-
     /// One of them.
     pub fn get(&self, index: usize) -> Point {
         Point {

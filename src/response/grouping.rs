@@ -1,15 +1,15 @@
 //! From contact surfaces to groups: what each candidate brings into the system of an
 //! [implicit step](super::implicit), as points that press and rub on the links that carry them.
 
-use super::group::{Grip, Group, Member, Point, Points, relative};
-use super::sharing::Sharing;
+use super::bundle::Bundle;
+use super::group::{Grip, Group, Member, Point, relative};
 use crate::base::{Inertia, Motion};
 use crate::contact::candidate::Candidate;
 use crate::contact::deepest::{self, Approach};
 use crate::contact::overload::is_overloaded;
 use crate::contact::pair::Pair;
 use crate::contact::patch::{self, Node, Patch, Sums};
-use crate::contact::press::{Carriers, Material, Share, friction_radius};
+use crate::contact::press::{Material, Share, friction_radius};
 use crate::contact::stiffness::reachable;
 use crate::math::{Twist, Vec3};
 
@@ -27,28 +27,6 @@ const WALL: f64 = 1e3;
 
 /// Cosine between directions from which on two places of a pair face the same way.
 const FACING: f64 = 0.9;
-
-/// Groups of some candidates, with their points and members.
-#[derive(Debug, Default)]
-pub struct Bundle {
-    /// The groups; their ranges count from the beginning of the bundle.
-    pub groups: Vec<Group>,
-    /// Points of all groups.
-    pub points: Points,
-    /// Members of all groups.
-    pub members: Vec<Member>,
-    carriers: Carriers,
-    sharing: Sharing,
-}
-
-impl Bundle {
-    /// Forgets the groups.
-    pub fn clear(&mut self) {
-        self.groups.clear();
-        self.points.clear();
-        self.members.clear();
-    }
-}
 
 /// A candidate whose groups are put together.
 pub struct Grouping<'a> {

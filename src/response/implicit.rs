@@ -6,10 +6,11 @@
 //! velocities ([`coupled`](super::coupled)). When the two do not agree after a few rounds, the step is taken in two
 //! halves. Frozen at the first pose, stiff contacts would gain energy and rolling would be braked.
 
-use super::coupled::{Coupled, put_twist, twist_of};
+use super::bundle::{Bundle, Part};
+use super::coupled::{Coupled, Problem, put_twist, twist_of};
 use super::envelope::{BLOCK, OrderBuffers, narrow_order};
-use super::group::{Group, Member, Points, Push};
-use super::grouping::{Bundle, CREEP, Grouping, RECOVERY, combinations, thicknesses, thinner};
+use super::group::{Group, Member};
+use super::grouping::{CREEP, Grouping, RECOVERY, combinations, thicknesses, thinner};
 use super::springs::{self, Tie};
 use super::substep::{Island, Step, bend_bristles, drift};
 use crate::base::Motion;
@@ -20,6 +21,7 @@ use crate::contact::pair::Pair;
 use crate::contact::patch::Sums;
 use crate::contact::press::Carriers;
 use crate::math::{Twist, Vec3, Wrench};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What the solver may spend.
 #[derive(Clone, Copy, Debug)]
@@ -32,17 +34,18 @@ pub struct Effort {
     pub splits: u32,
 }
 
-/// Pairs that a worker places in one go.
-const BLOCK_OF_PAIRS: usize = 16;
-
-/// Candidates whose groups a worker puts together in one go.
+/// Candidates that a worker takes in one go, and springs.
 const TOGETHER: usize = 8;
+const SPRINGS_TOGETHER: usize = 32;
 
 /// Velocity that a round may leave unsolved, over the velocity at work and the motion that it may leave unseen.
-const ACCURACY: f64 = 2e-8;
+const ACCURACY: f64 = 2e-5;
 
 /// How much faster a link may get in a step than any is before it, or differ from its free motion, by guess.
 const RUSH: f64 = 4.0;
+
+/// Approach in a step, over the thickness of the coats, that may stay in the first guess.
+const SLIGHT: f64 = 1e-3;
 
 /// Sweeps that take the approach out of the first guess.
 const SWEEPS: usize = 10;
@@ -63,11 +66,10 @@ const MOST_SOFTENINGS: u32 = 4;
 pub struct Solver {
     /// Links as they would be at the end of the step; a place for each slot.
     trial: Vec<Motion>,
-    /// The island's links with unknowns, in the order of the system.
-    order: Vec<u32>,
     graph: Graph,
-    bundles: Vec<Bundle>,
     coupled: Coupled,
+    /// The velocities at the start of the step, those at its end without contact, and those that are sought.
+    start: Vec<f64>,
     free: Vec<f64>,
     x: Vec<f64>,
     /// Where the surfaces were evaluated.
@@ -78,7 +80,6 @@ pub struct Solver {
     arm: f64,
     /// How far apart two skeletons are that nothing in the round can bring together \[m\].
     reach: f64,
-    carriers: Carriers,
     /// Impulses that the links of articulations had before, articulation by articulation.
     before: Vec<Wrench>,
     /// Rounds of the last step, all halves together.
@@ -89,7 +90,10 @@ pub struct Solver {
 
 #[derive(Debug, Default)]
 struct Graph {
+    /// The island's links with unknowns, in the order of the system.
     nodes: Vec<u32>,
+    /// Of each link among the nodes, by slot.
+    places: Vec<Option<u32>>,
     edges: Vec<(u32, u32)>,
     order: Vec<u32>,
     buffers: OrderBuffers,
@@ -121,6 +125,8 @@ struct Nearby {
     /// The highest speed at their ends, and their longest arm.
     fastest: f64,
     arm: f64,
+    /// Some come closer than they may.
+    close: bool,
 }
 
 impl Nearby {
@@ -132,13 +138,17 @@ impl Nearby {
             }
             let links = [pair.a.links[i], pair.b.links[j]];
             let arms = links.map(|link| approach.meeting - (motions[link as usize].center - pair.origin));
-            let gap = approach.distance - thicknesses(pair, i, j);
+            let thickness = thicknesses(pair, i, j);
+            let gap = approach.distance - thickness;
             let (least, mobility, impulse) = (-gap.max(0.0) / h, 0.0, 0.0);
             let row = Row { links, arms, normal: approach.direction, least, mobility, impulse };
-            for (velocity, arm) in row.velocities(motions).iter().zip(&row.arms) {
+            let velocities = row.velocities(motions);
+            for (velocity, arm) in velocities.iter().zip(&row.arms) {
                 self.fastest = self.fastest.max(velocity.norm());
                 self.arm = self.arm.max(arm.norm());
             }
+            let parting = (velocities[1] - velocities[0]).dot(&row.normal);
+            self.close |= (least - parting) * h > SLIGHT * thickness;
             self.rows.push(row);
         }
     }
@@ -147,7 +157,7 @@ impl Nearby {
 /// Advances an island by `dt`.
 pub fn step(step: &mut Step, dt: f64, effort: &Effort, solver: &mut Solver) {
     (solver.rounds, solver.splits) = (0, 0);
-    if step.island.candidates.is_empty() && step.island.springs.is_empty() {
+    if step.candidates.is_empty() && step.island.springs.is_empty() {
         fly(step.motions, step.island, dt);
         return;
     }
@@ -177,23 +187,31 @@ fn halves(step: &mut Step, dt: f64, effort: &Effort, splits: u32, solver: &mut S
 }
 
 impl Solver {
-    /// The links with unknowns, neighbours near each other.
+    /// The links with unknowns, and the order in which neighbours are near each other. Those that contacts touch and do not
+    /// move are the same throughout the step.
     fn order_links(&mut self, step: &Step) {
         let Step { island, candidates, motions, .. } = step;
-        let Graph { nodes, edges, order, buffers } = &mut self.graph;
-        nodes.clear();
+        let Graph { nodes, places, edges, order, buffers } = &mut self.graph;
+        // An island may be small, and the world large.
+        for link in nodes.drain(..) {
+            places[link as usize] = None;
+        }
         nodes.extend(island.links.iter().filter(|link| motions[**link as usize].is_movable()));
         nodes.sort_unstable();
+        places.resize(motions.len().max(places.len()), None);
+        for (place, link) in nodes.iter().enumerate() {
+            places[*link as usize] = Some(place as u32);
+        }
+        let place = |link: &u32| places[*link as usize];
         edges.clear();
-        let place = |link: &u32| nodes.binary_search(link).ok().map(|place| place as u32);
-        for index in &island.candidates {
-            let pair = &candidates[*index as usize].pair;
-            for a in pair.a.links.iter().filter_map(place) {
-                for b in pair.b.links.iter().filter_map(place) {
-                    if a != b {
-                        edges.push((a.min(b), a.max(b)));
-                    }
-                }
+        for candidate in candidates.iter() {
+            let Pair { a, b, .. } = &candidate.pair;
+            for a in a.links.iter().filter_map(place) {
+                edges.extend(b.links.iter().filter_map(place).filter(|b| a != *b).map(|b| (a.min(b), a.max(b))));
+            }
+            let covers = candidate.pair.covers.iter().map(|cover| &cover.link);
+            for link in a.links.iter().chain(&b.links).chain(covers).filter(|link| place(link).is_none()) {
+                self.trial[*link as usize] = motions[*link as usize];
             }
         }
         for [a, b] in island.springs.iter().map(|spring| spring.links) {
@@ -208,22 +226,23 @@ impl Solver {
         edges.sort_unstable();
         edges.dedup();
         narrow_order(nodes.len(), edges, order, buffers);
-        self.order.clear();
-        self.order.extend(order.iter().map(|place| nodes[*place as usize]));
-        self.coupled.joined.set(&self.order, step.articulations_of_island());
+        self.coupled.joined.set(nodes, step.articulations_of_island());
     }
 
     /// Tries a step. Unless it is the `last_resort`, nothing is changed when it fails.
     fn attempt(&mut self, step: &mut Step, h: f64, effort: &Effort, last_resort: bool) -> bool {
-        self.coupled.set_links(&self.order, step.motions);
-        self.free.clear();
-        self.free.resize(self.order.len() * BLOCK, 0.0);
-        for (block, link) in self.order.iter().enumerate() {
+        self.coupled.set_links(&self.graph.nodes, &self.graph.order, step.motions, step.team);
+        for twists in [&mut self.start, &mut self.free] {
+            twists.clear();
+            twists.resize(self.graph.nodes.len() * BLOCK, 0.0);
+        }
+        for (block, link) in self.graph.nodes.iter().enumerate() {
             let motion = &step.motions[*link as usize];
             let twist = Twist {
                 linear: motion.twist.linear + motion.acceleration * h,
                 angular: motion.twist.angular + motion.angular_acceleration * h,
             };
+            put_twist(&mut self.start, block as u32, &motion.twist);
             put_twist(&mut self.free, block as u32, &twist);
         }
         let mut clock = Clock::start(step.work.timed);
@@ -231,23 +250,20 @@ impl Solver {
         clock.lap(&mut step.work.solve_time);
         // Nearly all that contacts can do is to take away what makes the free motion differ.
         self.reach = RUSH * h * self.change(&self.free);
-        let nobody_near = step.island.candidates.is_empty();
+        let nobody_near = step.candidates.is_empty();
         let (mut converged, mut overloaded) = (false, false);
         for round in 0..effort.rounds {
             self.rounds += 1;
             self.look(step, h, round == 0);
             if round == 0 {
-                let is_overloaded = |index: &u32| !step.candidates[*index as usize].surface.overloads.is_empty();
-                overloaded = step.island.candidates.iter().any(is_overloaded);
+                overloaded = step.candidates.iter().any(|candidate| !candidate.surface.overloads.is_empty());
             }
             clock.lap(&mut step.work.contact_time);
             self.couple_all(step, h, false);
-            let solved =
-                self.coupled.solve(&mut self.x, &self.free, step.motions, h, ACCURACY * effort.tolerance, step.team);
+            let problem = Problem { start: &self.start, free: &self.free, fixed: step.motions, h, team: step.team };
+            let solved = self.coupled.solve(&mut self.x, &problem, ACCURACY * effort.tolerance);
             let closed = 2.0 * h * self.change(&self.looked);
-            converged = solved
-                && (closed <= self.reach || nobody_near)
-                && self.agrees(step.motions, step.candidates, h, effort.tolerance);
+            converged = solved && (closed <= self.reach || nobody_near) && self.agrees(step, h, effort.tolerance);
             self.reach = self.reach.max(RUSH * closed);
             clock.lap(&mut step.work.solve_time);
             if !solved || converged {
@@ -267,14 +283,15 @@ impl Solver {
             self.couple_all(step, h, true);
             let accuracy = ACCURACY * effort.tolerance;
             let mut softenings = 0;
-            while !self.coupled.solve(&mut self.x, &self.free, step.motions, h, accuracy, step.team) {
+            let problem = Problem { start: &self.start, free: &self.free, fixed: step.motions, h, team: step.team };
+            while !self.coupled.solve(&mut self.x, &problem, accuracy) {
                 // Forces that belong to no velocities could have any size.
                 if softenings == MOST_SOFTENINGS {
-                    self.coupled.clear();
+                    self.coupled.bundles_mut().iter_mut().for_each(Bundle::clear);
                     break;
                 }
                 softenings += 1;
-                self.coupled.soften(SOFTENING);
+                self.coupled.bundles_mut().iter_mut().for_each(|bundle| bundle.soften(SOFTENING));
                 self.x.fill(0.0);
             }
         }
@@ -287,33 +304,31 @@ impl Solver {
     fn first_guess(&mut self, step: &mut Step, h: f64) {
         let Step { motions, island, candidates, team, .. } = step;
         let motions = &**motions;
-        for link in &island.links {
-            self.trial[*link as usize] = motions[*link as usize];
-        }
-        team.each_at(candidates, &island.candidates, BLOCK_OF_PAIRS, |candidate| {
-            candidate.pair.place(motions, candidate.lead);
-        });
-        let candidates = &**candidates;
-        for index in &island.candidates {
-            let pair = &candidates[*index as usize].pair;
-            // Those that move are the island's, and there already.
-            for link in pair.a.links.iter().chain(&pair.b.links) {
-                if !motions[*link as usize].is_movable() {
-                    self.trial[*link as usize] = motions[*link as usize];
-                }
-            }
-        }
-        let count = island.candidates.len().div_ceil(TOGETHER);
+        let count = candidates.len().div_ceil(TOGETHER);
         self.nearby.resize_with(count.max(self.nearby.len()), Nearby::default);
-        team.each_mut(&mut self.nearby[..count], 1, |number, nearby| {
+        team.each_row(candidates, TOGETHER, &mut self.nearby[..count], |_, candidates, nearby| {
             nearby.rows.clear();
-            (nearby.fastest, nearby.arm) = (0.0, 0.0);
-            for index in island.candidates.iter().skip(number * TOGETHER).take(TOGETHER) {
-                nearby.add(&candidates[*index as usize].pair, motions, h);
+            (nearby.fastest, nearby.arm, nearby.close) = (0.0, 0.0, false);
+            for candidate in candidates {
+                candidate.pair.place(motions, candidate.lead);
+                nearby.add(&candidate.pair, motions, h);
             }
         });
         let nearby = &self.nearby[..count];
         self.arm = nearby.iter().map(|nearby| nearby.arm).fold(0.0, f64::max);
+        let close = nearby.iter().any(|nearby| nearby.close);
+        self.x.clone_from(&self.start);
+        if close {
+            for link in &island.links {
+                self.trial[*link as usize] = motions[*link as usize];
+            }
+            self.take_approach_out(count);
+        }
+    }
+
+    /// Changes velocities so that nobody comes closer than the rows of the first `count` of those nearby allow, roughly.
+    fn take_approach_out(&mut self, count: usize) {
+        let nearby = &self.nearby[..count];
         let fastest = nearby.iter().map(|nearby| nearby.fastest).fold(0.0, f64::max);
         self.rows.clear();
         // Nobody closes the other gaps.
@@ -348,14 +363,14 @@ impl Solver {
                 break;
             }
         }
-        self.x.clear();
-        self.x.resize(self.order.len() * BLOCK, 0.0);
-        for (block, link) in self.order.iter().enumerate() {
-            let (now, guess) = (&motions[*link as usize].twist, &self.trial[*link as usize].twist);
-            let free = twist_of(&self.free, block as u32);
+        for (block, link) in self.graph.nodes.iter().enumerate() {
+            let block = block as u32;
+            let (now, free) = (twist_of(&self.x, block), twist_of(&self.free, block));
+            let guess = &self.trial[*link as usize].twist;
             // Where contacts hold a link nearly as it is, it will be held as it is: what the sweeps left is no motion.
-            let held = (guess.linear - now.linear).norm() < 0.5 * (free.linear - now.linear).norm();
-            put_twist(&mut self.x, block as u32, if held { now } else { guess });
+            if (guess.linear - now.linear).norm() >= 0.5 * (free.linear - now.linear).norm() {
+                put_twist(&mut self.x, block, guess);
+            }
         }
     }
 
@@ -365,7 +380,7 @@ impl Solver {
             let (now, then) = (twist_of(&self.x, block as u32), twist_of(other, block as u32));
             (now.linear - then.linear).norm() + (now.angular - then.angular).norm() * self.arm
         };
-        (0..self.order.len()).map(size).fold(0.0, f64::max)
+        (0..self.graph.nodes.len()).map(size).fold(0.0, f64::max)
     }
 
     /// Evaluates the contacts where the velocities lead; in the `first` round, those that do not stand.
@@ -375,92 +390,95 @@ impl Solver {
         for link in &island.links {
             self.trial[*link as usize] = motions[*link as usize];
         }
-        for (block, link) in self.order.iter().enumerate() {
+        for (block, link) in self.graph.nodes.iter().enumerate() {
             self.trial[*link as usize].twist = twist_of(&self.x, block as u32);
         }
         drift(&mut self.trial, island, h);
         let trial = &self.trial;
-        work.look(island, candidates, team, |candidate| candidate.look_in_round(trial, settings, first));
+        work.look(candidates, team, |candidate| candidate.look_in_round(trial, settings, first));
     }
 
     /// Puts contact surfaces and springs into the system; as a `last_resort`, the surfaces frozen where they are.
     fn couple_all(&mut self, step: &Step, h: f64, last_resort: bool) {
-        self.coupled.clear();
+        let Self { coupled, trial, x, reach, .. } = self;
         let Step { motions, island, candidates, team, .. } = step;
-        let (motions, candidates, trial, reach) = (&**motions, &**candidates, &self.trial, self.reach);
-        let count = island.candidates.len().div_ceil(TOGETHER);
-        self.bundles.resize_with(count.max(self.bundles.len()), Bundle::default);
-        team.each_mut(&mut self.bundles[..count], 1, |number, bundle| {
-            bundle.clear();
-            for index in island.candidates.iter().skip(number * TOGETHER).take(TOGETHER) {
-                let (candidate, index) = (&candidates[*index as usize], *index);
-                Grouping { bundle: &mut *bundle, motions, trial, candidate, index, h, reach, last_resort }.add_all();
+        let (motions, candidates, trial, reach) = (&**motions, &**candidates, &**trial, *reach);
+        let (of_candidates, of_springs) =
+            (candidates.len().div_ceil(TOGETHER), island.springs.len().div_ceil(SPRINGS_TOGETHER));
+        coupled.put_together(of_candidates + of_springs, x, motions, team, |number, bundle| {
+            let Some(number) = number.checked_sub(of_candidates) else {
+                for (index, candidate) in candidates.iter().enumerate().skip(number * TOGETHER).take(TOGETHER) {
+                    let index = index as u32;
+                    Grouping { bundle: &mut *bundle, motions, trial, candidate, index, h, reach, last_resort }
+                        .add_all();
+                }
+                return;
+            };
+            for spring in island.springs.iter().skip(number * SPRINGS_TOGETHER).take(SPRINGS_TOGETHER) {
+                bundle.ties.push(Tie::new(spring, trial, &mut bundle.members));
             }
         });
-        for bundle in &self.bundles[..count] {
-            self.coupled.append(bundle);
-        }
-        self.coupled.set_base(&self.x, motions, team);
-        for spring in &island.springs {
-            let mut tie = Tie::new(spring, trial, &mut self.coupled.members);
-            tie.set_velocity(&self.coupled.relative_of(tie.members, &self.x, motions).linear);
-            self.coupled.ties.push(tie);
-        }
     }
 
-    /// Whether the contacts moved so little since they were evaluated that they are still what they were.
-    fn agrees(&self, motions: &[Motion], candidates: &[Kept], h: f64, tolerance: f64) -> bool {
-        let groups = self.coupled.groups.iter().all(|group| {
-            let now = self.coupled.relative_of(group.members, &self.x, motions);
-            let change = Twist { linear: now.linear - group.base.linear, angular: now.angular - group.base.angular };
-            let pair = &candidates[group.candidate as usize];
-            let speed = self.speed(group.members, motions, h);
-            let Some(patch) = group.patch else {
-                // A wall or a gap is exact, until it begins to push where it did not.
-                let point = self.coupled.points.get(group.points.0);
-                let closed = point.load - h * point.stiffness * point.normal.dot(&change.linear);
-                return point.load > 0.0 || closed <= 0.0 || change.linear.norm() <= NEGLIGIBLE * speed;
+    /// Whether the contacts and the springs moved so little since they were evaluated that they are still what they were.
+    fn agrees(&self, step: &Step, h: f64, tolerance: f64) -> bool {
+        let (bundles, off) = (self.coupled.bundles(), AtomicBool::new(false));
+        let (motions, candidates) = (&*step.motions, &*step.candidates);
+        step.team.each(bundles.len(), 1, |numbers| {
+            let agrees = |bundle: &Bundle| {
+                bundle.groups.iter().all(|group| self.group_agrees(bundle, group, motions, candidates, h, tolerance))
+                    && bundle.ties.iter().all(|tie| self.tie_agrees(bundle, tie, motions, h, tolerance))
             };
-            let patch = &pair.surface.patches[patch as usize];
-            let depth = patch.depth(&pair.pair);
-            let size = self.size(group).max(depth);
-            let moved = change.linear.norm() + change.angular.norm() * size;
-            // In each step anew, what is negligible in one would add up.
-            if !group.looked && moved <= NEGLIGIBLE * speed {
-                return true;
+            if !off.load(Ordering::Relaxed) && !bundles[numbers].iter().all(agrees) {
+                off.store(true, Ordering::Relaxed);
             }
-            let along = change.linear - patch.normal * change.linear.dot(&patch.normal);
-            let across = change.linear.dot(&patch.normal).abs() + change.angular.norm() * size;
-            h * across <= tolerance * depth && h * along.norm() <= tolerance * size
         });
-        groups && self.coupled.ties.iter().all(|tie| self.tie_agrees(tie, motions, h, tolerance))
+        !off.into_inner()
+    }
+
+    fn group_agrees(
+        &self,
+        bundle: &Bundle,
+        group: &Group,
+        motions: &[Motion],
+        candidates: &[Kept],
+        h: f64,
+        tolerance: f64,
+    ) -> bool {
+        let members = bundle.members_of(group.members);
+        let now = self.coupled.velocities(&self.x, motions).over(members);
+        let change = Twist { linear: now.linear - group.base.linear, angular: now.angular - group.base.angular };
+        let pair = &candidates[group.candidate as usize];
+        let speed = speed(members, motions, h);
+        let Some(patch) = group.patch else {
+            // A wall or a gap is exact, until it begins to push where it did not.
+            let point = bundle.points.get(group.points.0);
+            let closed = point.load - h * point.stiffness * point.normal.dot(&change.linear);
+            return point.load > 0.0 || closed <= 0.0 || change.linear.norm() <= NEGLIGIBLE * speed;
+        };
+        let patch = &pair.surface.patches[patch as usize];
+        let depth = patch.depth(&pair.pair);
+        let size = bundle.size(group).max(depth);
+        let moved = change.linear.norm() + change.angular.norm() * size;
+        // In each step anew, what is negligible in one would add up.
+        if !group.looked && moved <= NEGLIGIBLE * speed {
+            return true;
+        }
+        let along = change.linear - patch.normal * change.linear.dot(&patch.normal);
+        let across = change.linear.dot(&patch.normal).abs() + change.angular.norm() * size;
+        h * across <= tolerance * depth && h * along.norm() <= tolerance * size
     }
 
     /// Whether a tie's ends came where the system took them to be. In a turn they go round, and not straight on.
-    fn tie_agrees(&self, tie: &Tie, motions: &[Motion], h: f64, tolerance: f64) -> bool {
+    fn tie_agrees(&self, bundle: &Bundle, tie: &Tie, motions: &[Motion], h: f64, tolerance: f64) -> bool {
+        let members = bundle.members_of(tie.members);
         let turned = |member: &Member| {
             let turn = |x| self.coupled.twist_in(member.link, x).map_or_else(Vec3::zeros, |twist| twist.angular);
             if member.turns { (turn(&self.x) - turn(&self.looked)).norm_squared() * h * member.arm.norm() } else { 0.0 }
         };
-        let off = self.coupled.members[tie.members.0..tie.members.1].iter().map(turned).sum::<f64>();
-        let velocity = self.coupled.relative_of(tie.members, &self.x, motions).linear;
-        h * off <= tolerance * tie.stretch(&velocity, h).abs()
-            || off <= NEGLIGIBLE * self.speed(tie.members, motions, h)
-    }
-
-    /// Half the width of a group's patch.
-    fn size(&self, group: &Group) -> f64 {
-        (self.coupled.points.sums(group.points).0 / std::f64::consts::PI).sqrt()
-    }
-
-    /// The speeds that are at work among some members in this step.
-    fn speed(&self, (first, end): (usize, usize), motions: &[Motion], h: f64) -> f64 {
-        let members = &self.coupled.members[first..end];
-        let speed = |member: &Member| {
-            let motion = &motions[member.link as usize];
-            motion.acceleration.norm() * h + NEGLIGIBLE * motion.twist.at(&member.arm).norm()
-        };
-        members.iter().map(speed).sum()
+        let off = members.iter().map(turned).sum::<f64>();
+        let velocity = self.coupled.velocities(&self.x, motions).over(members).linear;
+        h * off <= tolerance * tie.stretch(&velocity, h).abs() || off <= NEGLIGIBLE * speed(members, motions, h)
     }
 
     /// Moves the links by the velocities found, and hands every contact its forces.
@@ -470,17 +488,14 @@ impl Solver {
         for articulation in articulations.clone() {
             self.before.extend(articulation.links.iter().map(|link| step.motions[*link as usize].contact_impulse));
         }
-        let Step { motions, island, candidates, .. } = step;
-        for index in &island.candidates {
-            let candidate = &mut candidates[*index as usize];
-            candidate.loads.clear();
-            candidate.loads.resize(candidate.surface.patches.len(), Sums::default());
-            if !candidate.surface.overloads.is_empty() {
-                candidate.memory.overloaded = true;
-                candidate.memory.touched = true;
-            }
-        }
-        let untouched = self.coupled.pushes().all(|(_, push)| push.all == Wrench::default());
+        let Step { motions, island, candidates, team, .. } = step;
+        let of_candidates = candidates.len().div_ceil(TOGETHER);
+        let bundles = self.coupled.bundles_mut();
+        team.each_row(candidates, TOGETHER, &mut bundles[..of_candidates], |number, candidates, bundle| {
+            hand_out(bundle, number * TOGETHER, candidates);
+        });
+        let pushes = || bundles.iter().flat_map(Bundle::pushes);
+        let untouched = pushes().all(|(_, push)| push.all == Wrench::default());
         if untouched && island.springs.is_empty() {
             fly(motions, island, h);
             return;
@@ -488,21 +503,15 @@ impl Solver {
         for link in &island.links {
             motions[*link as usize].kick(h);
         }
-        for (group, push) in self.coupled.pushes() {
-            for member in &self.coupled.members[group.members.0..group.members.1] {
-                let force = push.all.force * (h * member.weight);
-                let torque = push.all.torque * (h * member.weight) + member.arm.cross(&force);
-                if push.all.force != Vec3::zeros() {
+        for bundle in bundles.iter() {
+            for (index, (range, Part { push, .. })) in bundle.ranges().zip(&bundle.parts).enumerate() {
+                // A slack spring touches too.
+                let acts = push.all.force != Vec3::zeros() || index >= bundle.groups.len();
+                for member in bundle.members_of(range).iter().filter(|_| acts) {
+                    let force = push.all.force * (h * member.weight);
+                    let torque = push.all.torque * (h * member.weight) + member.arm.cross(&force);
                     motions[member.link as usize].push(&Wrench { force, torque });
                 }
-            }
-        }
-        for tie in &self.coupled.ties {
-            let velocity = self.coupled.relative_of(tie.members, &self.x, &self.trial).linear;
-            let (force, _) = tie.respond(&velocity, h);
-            for member in &self.coupled.members[tie.members.0..tie.members.1] {
-                let force = force * (h * member.weight);
-                motions[member.link as usize].push(&Wrench { force, torque: member.arm.cross(&force) });
             }
         }
         let mut before = self.before.iter();
@@ -515,17 +524,6 @@ impl Solver {
                 }
             }
         }
-        let same = |a: &Group, b: &Group| (a.candidate, a.patch) == (b.candidate, b.patch);
-        let mut first = 0;
-        for groups in self.coupled.groups.chunk_by(same) {
-            let pushes = self.coupled.pushes().skip(first).take(groups.len());
-            first += groups.len();
-            let Some(patch) = groups[0].patch else { continue };
-            let candidate = &mut candidates[groups[0].candidate as usize];
-            let sums = patch_sums(pushes, &self.coupled.points);
-            candidate.memory.touched |= sums.force != Vec3::zeros();
-            candidate.loads[patch as usize] = sums;
-        }
         drift(motions, island, h);
         if let Some(fall) = springs::fall_as_one(&island.springs, &island.links, motions).filter(|_| untouched) {
             for link in &island.links {
@@ -533,57 +531,66 @@ impl Solver {
                 motion.center -= if motion.is_movable() { fall * (0.5 * h * h) } else { Vec3::zeros() };
             }
         }
-        for index in &island.candidates {
-            let candidate = &mut candidates[*index as usize];
-            if candidate.material.static_friction > 0.0 {
-                bend_bristles(candidate, motions, h, &mut self.carriers);
-                self.let_go(candidate, motions, h);
+        let (motions, bundles) = (&**motions, self.coupled.bundles_mut());
+        team.each_row(candidates, TOGETHER, &mut bundles[..of_candidates], |_, candidates, bundle| {
+            for candidate in candidates.iter_mut().filter(|candidate| candidate.material.static_friction > 0.0) {
+                bend_bristles(candidate, motions, h, &mut bundle.carriers);
+                let_go(candidate, motions, h, &mut bundle.carriers);
             }
-        }
-    }
-
-    /// Bristles of patches that slide bend no further.
-    fn let_go(&mut self, candidate: &mut Candidate, motions: &[Motion], h: f64) {
-        let Candidate { pair, surface, loads, memory, .. } = candidate;
-        for (patch, load) in surface.patches.iter().zip(loads.iter()) {
-            if load.force == Vec3::zeros() {
-                continue;
-            }
-            let [i, j] = patch.skeletons;
-            let key = patch.key(pair);
-            let Some(bristle) = memory.bristles.iter_mut().find(|bristle| bristle.key == key) else { continue };
-            let thickness = thinner(pair, i, j);
-            self.carriers.find(pair, &load.center);
-            let normal = load.force.normalize();
-            let slip = self.carriers.slip(motions, &pair.origin, &load.center);
-            let slip = slip - normal * slip.dot(&normal);
-            let wanted = slip + bristle.slip * (RECOVERY / h);
-            bristle.sliding = wanted.norm() > LET_GO * CREEP * thickness;
-            if bristle.sliding {
-                (bristle.slip, bristle.turn) = (Vec3::zeros(), 0.0);
-            }
-        }
+        });
     }
 }
 
-/// What the groups of one patch come to, about their common centre of pressure.
-fn patch_sums<'a>(pushes: impl Iterator<Item = (&'a Group, &'a Push)> + Clone, points: &Points) -> Sums {
-    let mut sums = Sums::default();
-    let mut load = 0.0;
-    for (group, push) in pushes.clone() {
-        let size = push.pressing.force.norm();
-        sums.center += group.center * size;
-        load += size;
-        sums.force += push.pressing.force;
-        let (area, stiffness) = points.sums(group.points);
-        sums.area += area;
-        sums.stiffness += stiffness;
+/// Hands candidates, from the `first` on, what the groups of their patches came to.
+fn hand_out(bundle: &Bundle, first: usize, candidates: &mut [Kept]) {
+    for candidate in candidates.iter_mut() {
+        candidate.loads.clear();
+        candidate.loads.resize(candidate.surface.patches.len(), Sums::default());
+        if !candidate.surface.overloads.is_empty() {
+            (candidate.memory.overloaded, candidate.memory.touched) = (true, true);
+        }
     }
-    if load > 0.0 {
-        sums.center /= load;
+    let same = |a: &Group, b: &Group| (a.candidate, a.patch) == (b.candidate, b.patch);
+    let mut begin = 0;
+    for groups in bundle.groups.chunk_by(same) {
+        let range = begin..begin + groups.len();
+        begin = range.end;
+        let Some(patch) = groups[0].patch else { continue };
+        let candidate = &mut candidates[groups[0].candidate as usize - first];
+        let sums = bundle.sums_of(range);
+        candidate.memory.touched |= sums.force != Vec3::zeros();
+        candidate.loads[patch as usize] = sums;
     }
-    for (group, push) in pushes {
-        sums.torque += push.pressing.torque + (group.center - sums.center).cross(&push.pressing.force);
+}
+
+/// The speeds that are at work among some members in this step.
+fn speed(members: &[Member], motions: &[Motion], h: f64) -> f64 {
+    let speed = |member: &Member| {
+        let motion = &motions[member.link as usize];
+        motion.acceleration.norm() * h + NEGLIGIBLE * motion.twist.at(&member.arm).norm()
+    };
+    members.iter().map(speed).sum()
+}
+
+/// Bristles of patches that slide bend no further.
+fn let_go(candidate: &mut Candidate, motions: &[Motion], h: f64, carriers: &mut Carriers) {
+    let Candidate { pair, surface, loads, memory, .. } = candidate;
+    for (patch, load) in surface.patches.iter().zip(loads.iter()) {
+        if load.force == Vec3::zeros() {
+            continue;
+        }
+        let [i, j] = patch.skeletons;
+        let key = patch.key(pair);
+        let Some(bristle) = memory.bristles.iter_mut().find(|bristle| bristle.key == key) else { continue };
+        let thickness = thinner(pair, i, j);
+        carriers.find(pair, &load.center);
+        let normal = load.force.normalize();
+        let slip = carriers.slip(motions, &pair.origin, &load.center);
+        let slip = slip - normal * slip.dot(&normal);
+        let wanted = slip + bristle.slip * (RECOVERY / h);
+        bristle.sliding = wanted.norm() > LET_GO * CREEP * thickness;
+        if bristle.sliding {
+            (bristle.slip, bristle.turn) = (Vec3::zeros(), 0.0);
+        }
     }
-    sums
 }

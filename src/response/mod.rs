@@ -1,5 +1,6 @@
 //! Response: how contacts and springs move links.
 
+pub mod bundle;
 pub mod conjugate;
 pub mod coupled;
 pub mod envelope;

@@ -17,8 +17,6 @@ use crate::team::Team;
 pub struct Island {
     /// Slots of the links that move, each once.
     pub links: Vec<u32>,
-    /// Positions in a list of candidates, in ascending order.
-    pub candidates: Vec<u32>,
     /// Springs between the links.
     pub springs: Vec<Spring>,
     /// Positions in a list of articulations; none where each link is taken by itself.
@@ -34,7 +32,7 @@ pub struct Step<'a> {
     pub motions: &'a mut [Motion],
     /// Who is stepped.
     pub island: &'a Island,
-    /// Their candidates, and maybe others.
+    /// Their candidates.
     pub candidates: &'a mut [Kept],
     /// Which links the host's joints hold together.
     pub articulations: &'a [Articulation],
@@ -63,20 +61,11 @@ pub struct Work {
 }
 
 impl Work {
-    /// Brings the contact surfaces of an island up to the present poses, each by `look`.
-    pub fn look(
-        &mut self,
-        island: &Island,
-        candidates: &mut [Kept],
-        team: &Team,
-        look: impl Fn(&mut Candidate) + Sync,
-    ) {
-        team.each_at(candidates, &island.candidates, BLOCK, |candidate| look(candidate));
-        for index in &island.candidates {
-            let candidate = &candidates[*index as usize];
-            if candidate.fresh {
-                self.tally.add(&candidate.surface);
-            }
+    /// Brings contact surfaces up to the present poses, each by `look`.
+    pub fn look(&mut self, candidates: &mut [Kept], team: &Team, look: impl Fn(&mut Candidate) + Sync) {
+        team.each_mut(candidates, BLOCK, |_, candidate| look(candidate));
+        for candidate in candidates.iter().filter(|candidate| candidate.fresh) {
+            self.tally.add(&candidate.surface);
         }
     }
 }
@@ -98,11 +87,11 @@ impl<'a> Step<'a> {
         drift(motions, island, before * h);
         let mut clock = Clock::start(work.timed);
         let motions = &mut **motions;
-        work.look(island, candidates, team, |candidate| candidate.look(motions, settings, fresh));
+        work.look(candidates, team, |candidate| candidate.look(motions, settings, fresh));
         clock.lap(&mut work.contact_time);
         let mut overloaded = false;
-        for index in &island.candidates {
-            let Candidate { surface, memory, .. } = &mut *candidates[*index as usize];
+        for candidate in candidates.iter_mut() {
+            let Candidate { surface, memory, .. } = &mut **candidate;
             if !surface.overloads.is_empty() {
                 (memory.overloaded, memory.touched, overloaded) = (true, true, true);
             }
@@ -111,11 +100,8 @@ impl<'a> Step<'a> {
             drift(motions, island, -before * h);
             return false;
         }
-        for index in &island.candidates {
-            let candidate = &mut candidates[*index as usize];
-            if candidate.material.static_friction > 0.0 {
-                bend_bristles(candidate, motions, h, &mut work.carriers);
-            }
+        for candidate in candidates.iter_mut().filter(|candidate| candidate.material.static_friction > 0.0) {
+            bend_bristles(candidate, motions, h, &mut work.carriers);
         }
         springs::damp(island.springs.iter(), motions, 0.5 * h);
         for link in &island.links {
@@ -123,8 +109,8 @@ impl<'a> Step<'a> {
         }
         springs::kick(&island.springs, motions, h);
         work.grips.clear();
-        for index in &island.candidates {
-            press_candidate(&mut candidates[*index as usize], *index as usize, motions, h, work);
+        for (index, candidate) in candidates.iter_mut().enumerate() {
+            press_candidate(candidate, index, motions, h, work);
         }
         rub(candidates, motions, h, work);
         springs::damp(island.springs.iter().rev(), motions, 0.5 * h);

@@ -31,8 +31,7 @@ pub fn plan(
     rates: &mut [f64],
 ) -> f64 {
     let (mut travel, mut rate2) = (0.0f64, 0.0f64);
-    for index in &island.candidates {
-        let candidate = &mut candidates[*index as usize];
+    for candidate in candidates.iter_mut() {
         candidate.pair.place(motions, candidate.lead);
         let (reached, crossed) = demand(&candidate.pair, motions, dt, |_| 0.0);
         candidate.memory.rate2 = if candidate.memory.touching { reached.max(candidate.memory.rate2) } else { reached };
@@ -44,8 +43,8 @@ pub fn plan(
         }
     }
     // Those that bounce off one may meet another in the same step: by then mostly out of the first.
-    for index in &island.candidates {
-        let Candidate { pair, memory, .. } = &mut *candidates[*index as usize];
+    for candidate in candidates.iter_mut() {
+        let Candidate { pair, memory, .. } = &mut **candidate;
         let thrown = |link: u32| {
             let others = rates[link as usize] > memory.rate2;
             if others { motions[link as usize].recoil } else { 0.0 }

@@ -9,7 +9,7 @@ use crate::base::{Articulation, Kind, Motion};
 use crate::contact::surface;
 use crate::contact::tally::Tally;
 use crate::math::Wrench;
-use crate::response::substep::{Island, Step, Work};
+use crate::response::substep::{Step, Work};
 use crate::response::{Response, explicit, implicit, substepped};
 use crate::team::Team;
 
@@ -29,9 +29,8 @@ const BLOCK: usize = 4;
 /// What each worker needs for itself.
 #[derive(Debug, Default)]
 pub(super) struct Worker {
-    /// All links, for islands that are stepped beside others; once they are those of this step.
+    /// The links of the islands that are stepped beside others, each in its slot, until all are gathered up.
     motions: Vec<Motion>,
-    ready: bool,
     /// A place for each link.
     rates: Vec<f64>,
     pub work: Work,
@@ -111,7 +110,7 @@ fn idle(workers: &[Mutex<Worker>]) -> (usize, MutexGuard<'_, Worker>) {
     }
 }
 
-/// Steps the islands that are marked for it, each by one worker with all links for itself.
+/// Steps the islands that are marked for it, each by one worker who has its links for himself.
 fn step_beside_each_other(state: &mut Stepping, rules: &Rules, team: &Team) {
     let Stepping { islands, motions, workers, .. } = state;
     team.each_mut(&mut islands[..state.island_count], BLOCK, |_, group| {
@@ -119,9 +118,12 @@ fn step_beside_each_other(state: &mut Stepping, rules: &Rules, team: &Team) {
             return;
         }
         let (number, mut worker) = idle(workers);
-        let Worker { motions: own, ready, work, implicit, .. } = &mut *worker;
-        if !std::mem::replace(ready, true) {
-            own.clone_from(motions);
+        let Worker { motions: own, work, implicit, .. } = &mut *worker;
+        own.resize(motions.len(), Motion::default());
+        let articulations = group.island.articulations.iter().map(|index| &rules.articulations[*index as usize]);
+        let held = articulations.flat_map(|articulation| &articulation.links);
+        for link in group.island.links.iter().chain(&group.supports).chain(held) {
+            own[*link as usize] = motions[*link as usize];
         }
         rules.step(group, own, work, implicit, &Team::alone());
         group.worker = number;
@@ -152,10 +154,6 @@ impl Stepping {
     fn hand_out_candidates(&mut self) {
         for (candidate, owner) in self.candidates.drain(..).zip(&self.owners) {
             self.islands[*owner as usize].candidates.push(candidate);
-        }
-        for Group { island, candidates, .. } in &mut self.islands[..self.island_count] {
-            island.candidates.clear();
-            island.candidates.extend(0..candidates.len() as u32);
         }
     }
 
@@ -190,8 +188,9 @@ impl World {
         for worker in &mut state.workers {
             unlocked(worker).rates.resize(state.motions.len(), 0.0);
         }
+        state.hand_out_candidates();
         for index in 0..state.island_count {
-            let (response, forced) = self.choose(&state.islands[index].island, state, dt);
+            let (response, forced) = self.choose(&state.islands[index], state, dt);
             let group = &mut state.islands[index];
             (group.response, group.forced, group.substeps) = (response, forced, 0.0);
         }
@@ -203,7 +202,6 @@ impl World {
                 }
             }
         }
-        state.hand_out_candidates();
         plan(state, &rules, team);
         let most = f64::from(self.desc.max_substeps);
         for index in 0..state.island_count {
@@ -222,8 +220,8 @@ impl World {
             self.meet_hosts(state, index, response, dt, &articulations);
         }
         for worker in &mut state.workers {
-            let Worker { ready, work, .. } = unlocked(worker);
-            (*ready, work.tally, work.timed) = (false, Tally::default(), self.desc.timed);
+            let work = &mut unlocked(worker).work;
+            (work.tally, work.timed) = (Tally::default(), self.desc.timed);
             (work.contact_time, work.solve_time) = (0.0, 0.0);
         }
         let groups = &mut state.islands[..state.island_count];
@@ -254,7 +252,8 @@ impl World {
         for group in groups.iter_mut() {
             if group.beside {
                 let moved = &unlocked(&mut workers[group.worker]).motions;
-                for link in group.island.links.iter().filter(|link| group.supports.binary_search(link).is_err()) {
+                // Who is pushed is in no other island; what others lean on too is as it was.
+                for link in group.island.links.iter().filter(|link| moved[**link as usize].is_movable()) {
                     motions[*link as usize] = moved[*link as usize];
                 }
             }
@@ -316,7 +315,8 @@ impl World {
     /// The response of an island. What a body or the world forces holds for all that it touches, the most stable first;
     /// left to itself, implicit is for what is jointed, held by its host, stacked, or on stiff springs, and sub-steps for
     /// the rest. Also whether it is forced.
-    fn choose(&self, island: &Island, state: &Stepping, dt: f64) -> (Response, bool) {
+    fn choose(&self, group: &Group, state: &Stepping, dt: f64) -> (Response, bool) {
+        let Group { island, candidates, .. } = group;
         let movable = |link: &&u32| state.motions[**link as usize].is_movable();
         let links = || island.links.iter().filter(movable).map(|link| &self.links[*link as usize]);
         let forced = |response| {
@@ -334,7 +334,7 @@ impl World {
         let stiff = island.springs.iter().any(|spring| spring.rate2(&state.motions).sqrt() * dt > STIFF);
         // Substances have pushed by now.
         let pushed = || island.links.iter().any(|link| state.motions[*link as usize].touched);
-        let implicit = held && (!island.candidates.is_empty() || pushed()) || stiff;
+        let implicit = held && (!candidates.is_empty() || pushed()) || stiff;
         (if implicit { Response::Implicit } else { Response::Substepped }, false)
     }
 

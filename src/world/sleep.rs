@@ -82,10 +82,10 @@ impl World {
                 if at(next) == Some(*pair) || !self.may_touch(pair, &state.motions, &mut filter) {
                     continue;
                 }
-                let bounds = pair.map(|body| &state.bounds[state.bounds_of[body as usize]]);
+                let [Some(a), Some(b)] = pair.map(|body| &state.bounds_of[body as usize]) else { continue };
                 let mut probe = std::mem::take(&mut state.probe);
                 probe.bodies = *pair;
-                if self.fill(&mut probe, &state.motions, bounds, dt) {
+                if self.fill(&mut probe, &state.motions, [a, b], dt) {
                     for body in pair {
                         woken |= wake(&mut self.bodies, *body);
                     }
@@ -138,13 +138,11 @@ impl World {
         }
     }
 
-    /// Forgets the contacts of those who woke up; gives the number of those that are still asleep.
+    /// Forgets the contacts of those who woke up.
     pub(super) fn keep_resting_contacts(&self, state: &mut Stepping) {
         let front = &state.contacts[..state.resting_contacts];
         let rests = |contact: &Contact| contact.bodies.iter().any(|id| is_asleep(&self.bodies, id.raw.index));
-        if front.iter().all(rests) {
-            state.contacts.truncate(state.resting_contacts);
-        } else {
+        if !front.iter().all(rests) {
             state.contacts.truncate(state.resting_contacts);
             state.contacts.retain(rests);
             state.resting_contacts = state.contacts.len();
@@ -215,7 +213,7 @@ impl World {
             return body.desc.may_sleep && substance.is_slow(self.desc.sleep_speed * thickness);
         }
         let thickness = self.skeletons_of(body).map(|(_, _, s)| s.profile.thickness).fold(f64::INFINITY, f64::min);
-        let bounds = state.bounds_of.get(slot).and_then(|position| state.bounds.get(*position));
+        let bounds = state.bounds_of.get(slot).and_then(Option::as_ref);
         let size = bounds.map_or(0.0, |bounds| 0.5 * (bounds.high - bounds.low).norm());
         let most = if thickness.is_finite() { self.desc.sleep_speed * thickness } else { 0.0 };
         body.desc.may_sleep

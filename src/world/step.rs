@@ -9,7 +9,7 @@ use super::{BodyId, Link, World, units};
 use crate::base::{Articulation, Kind, Motion};
 use crate::clock::Clock;
 use crate::coat::cliques::Block;
-use crate::contact::broad_phase::{self, Bounds};
+use crate::contact::broad_phase::{Bounds, BroadPhase};
 use crate::contact::candidate::{Candidate, Kept, Memory};
 use crate::contact::pair::{Pair, Side};
 use crate::contact::surface;
@@ -21,6 +21,10 @@ use crate::response::substep::Island;
 use crate::substance::system::System;
 use crate::team::Team;
 
+/// Least links, and bodies, that a worker takes in one go.
+const LINKS: usize = 16;
+const BODIES: usize = 16;
+
 /// Candidates that a worker fills in one go.
 const FILLED: usize = 16;
 
@@ -31,20 +35,19 @@ pub(crate) struct Stepping {
     pub(super) motions: Vec<Motion>,
     /// How each link was moved, by slot.
     pub(super) responses: Vec<Response>,
+    /// Bounds of the bodies, by their slots, and all that there are; of those asleep they last.
+    pub(super) bounds_of: Vec<Option<Bounds>>,
     pub(super) bounds: Vec<Bounds>,
-    pub(super) bounds_of: Vec<usize>,
-    pub(super) pairs: Vec<[u32; 2]>,
-    /// Bounds of the last step, body by body, and the pairs that meet among them: while nobody moves, nobody else meets.
-    pub(super) last_bounds: Vec<Bounds>,
-    new_bounds: Vec<Bounds>,
     /// Who slept when they were found, as a revision, and the length of that step.
     bounded_for: (u64, f64),
-    met: Vec<[u32; 2]>,
+    broad_phase: BroadPhase,
+    pub(super) pairs: Vec<[u32; 2]>,
     meetings: Vec<Meeting>,
     /// In the order of their bodies.
     pub(super) candidates: Vec<Kept>,
-    /// Those of the last step, then their memory for reuse.
+    /// Those of the last step, while these are found, and those that are none any more.
     previous: Vec<Kept>,
+    gone: Vec<Kept>,
     pub(super) spare: Vec<Kept>,
     /// Of the pairs that are asleep, in the order of their bodies.
     pub(super) resting: Vec<Memory>,
@@ -67,6 +70,9 @@ pub(crate) struct Stepping {
     /// Working memory of each worker; the first always is the thread that steps.
     pub(super) workers: Vec<Mutex<Worker>>,
     pub(super) contacts: Vec<Contact>,
+    /// Of each candidate, what is to be said, and the end of its contacts behind those asleep.
+    conclusions: Vec<Conclusion>,
+    contact_ends: Vec<usize>,
     pub(super) system: System,
     pub(super) substance_contacts: Vec<Contact>,
     events: Vec<Event>,
@@ -103,6 +109,38 @@ pub(super) struct Group {
     pub beside: bool,
     pub worker: usize,
     pub outcome: Outcome,
+}
+
+/// What is to be said of a candidate at the end of a step.
+#[derive(Clone, Copy, Debug, Default)]
+struct Conclusion {
+    contacts: usize,
+    begins: bool,
+    ends: bool,
+    overloads: bool,
+}
+
+impl Conclusion {
+    /// What happened, noted in the candidate's memory too.
+    fn of(candidate: &mut Candidate, implicit: bool) -> Self {
+        let overloaded = !candidate.surface.overloads.is_empty();
+        let contacts = candidate.pressing().count();
+        let touching = contacts > 0 || overloaded;
+        let held = if implicit { 0.0 } else { candidate.elastic_energy() };
+        let memory = &mut candidate.memory;
+        // It may have come and gone within the step.
+        let passed = !memory.touching && !touching && memory.touched;
+        let conclusion = Self {
+            contacts,
+            begins: !memory.touching && touching || passed,
+            ends: memory.touching && !touching || passed,
+            overloads: memory.overloaded && !memory.was_overloaded,
+        };
+        (memory.touching, memory.held) = (touching, held);
+        memory.was_overloaded = overloaded || memory.overloaded && touching;
+        memory.overloaded = false;
+        conclusion
+    }
 }
 
 /// What stepping an island took.
@@ -149,11 +187,10 @@ impl Stepping {
             bounds_of: _,
             pairs: _,
             meetings: _,
-            last_bounds: _,
-            new_bounds: _,
             bounded_for: _,
-            met: _,
+            broad_phase: _,
             previous: _,
+            gone: _,
             spare: _,
             controlled: _,
             islands: _,
@@ -164,6 +201,8 @@ impl Stepping {
             touches: _,
             workers: _,
             contacts,
+            conclusions: _,
+            contact_ends: _,
             system: _,
             substance_contacts: _,
             events: _,
@@ -220,7 +259,7 @@ impl World {
         self.ramp_blends(state, dt);
         self.control_volumes(state, team);
         self.wake_near_substances(state, dt);
-        self.begin(state, dt);
+        self.begin(state, dt, team);
         clock.lap(&mut times.begin);
         self.find_candidates(state, dt, team);
         self.check_units(state, dt);
@@ -232,7 +271,7 @@ impl World {
         self.respond(state, dt, team);
         clock.lap(&mut times.respond);
         self.finish(state, dt);
-        self.report(state);
+        self.report(state, team);
         self.let_sleep(state, dt);
         clock.lap(&mut times.report);
         whole.lap(&mut times.step);
@@ -245,23 +284,31 @@ impl World {
     }
 
     /// Motions from the descriptors, host-driven ones through their mirrors; the host's pushes on our own.
-    fn begin(&mut self, state: &mut Stepping, dt: f64) {
+    fn begin(&mut self, state: &mut Stepping, dt: f64, team: &Team) {
         let settled = std::mem::replace(&mut state.settled, true);
-        state.motions.resize(self.links.capacity(), Motion::default());
-        for index in 0..self.links.capacity() {
-            if !self.links.is_live(index) || settled && self.sleeps(&self.links[index]) {
+        let is_new =
+            |world: &Self, index: usize| world.links.is_live(index) && !(settled && world.sleeps(&world.links[index]));
+        let count = self.links.capacity();
+        state.motions.resize(count, Motion::default());
+        let world = &*self;
+        team.each_mut(&mut state.motions, team.share(count, LINKS), |index, motion| {
+            if is_new(world, index) {
+                *motion = world.motion_of(&world.links[index]);
+            }
+        });
+        for index in 0..count {
+            if !is_new(self, index) {
                 continue;
             }
-            let mut motion = self.motion_of(&self.links[index]);
             let hosted = self.links[index].desc.kind == Kind::Host;
             let host = if hosted { self.host(&self.links[index]) } else { Host::default() };
-            let link = &mut self.links[index];
+            let (link, motion) = (&mut self.links[index], &mut state.motions[index]);
             if hosted && motion.is_movable() {
-                if link.mirror.enter(&host, &mut motion, dt) {
+                if link.mirror.enter(&host, motion, dt) {
                     let body = link.body;
                     state.forget_contacts_of(body);
                 }
-            } else if motion.is_movable() {
+            } else if motion.is_movable() && (link.applied_force, link.applied_impulse) != Default::default() {
                 let pushed = motion.answer(&link.applied_impulse);
                 motion.twist.linear += pushed.linear;
                 motion.twist.angular += pushed.angular;
@@ -269,8 +316,8 @@ impl World {
                 motion.acceleration += pulled.linear;
                 motion.angular_acceleration += pulled.angular;
             }
+            let link = &mut self.links[index];
             (link.applied_force, link.applied_impulse) = (Wrench::default(), Wrench::default());
-            state.motions[index] = motion;
         }
         self.foresee_bounces(state);
         for articulation in &self.articulations {
@@ -280,21 +327,11 @@ impl World {
 
     /// Pairs of bodies whose bounds meet and that may touch.
     fn find_candidates(&mut self, state: &mut Stepping, dt: f64, team: &Team) {
-        self.find_bounds(state, dt);
-        if state.new_bounds != state.last_bounds {
-            state.bounds.clone_from(&state.new_bounds);
-            broad_phase::pairs(&mut state.bounds, &mut state.met);
-            std::mem::swap(&mut state.new_bounds, &mut state.last_bounds);
-        }
+        self.find_bounds(state, dt, team);
         state.pairs.clear();
         self.take_up_memories(state);
         if !self.all_rest(state) {
-            state.pairs.extend_from_slice(&state.met);
-            state.bounds_of.clear();
-            state.bounds_of.resize(self.bodies.capacity(), usize::MAX);
-            for (position, bounds) in state.bounds.iter().enumerate() {
-                state.bounds_of[bounds.body as usize] = position;
-            }
+            state.broad_phase.find(&state.bounds, &mut state.pairs);
             self.wake_touched(state, dt);
             let mut filter = self.pair_filter.get_mut().take();
             state.pairs.retain(|pair| {
@@ -303,62 +340,68 @@ impl World {
             });
             *self.pair_filter.get_mut() = filter;
         }
-        std::mem::swap(&mut state.candidates, &mut state.previous);
         self.list_meetings(state);
-        let mut old = 0;
-        for Meeting { bodies, part, block } in &state.meetings {
-            let key = (*bodies, *part);
-            while old < state.previous.len() && state.previous[old].key() < key {
-                old += 1;
-            }
-            // A body that took over the slot of a destroyed one is another body.
-            let ids = bodies.map(|body| self.bodies.id_of(body as usize).raw);
-            let known = state.previous.get(old).is_some_and(|last| last.key() == key && last.memory.ids == ids);
-            let mut candidate = state.spare.pop().unwrap_or_default();
-            candidate.memory.forget();
-            if known {
-                std::mem::swap(&mut candidate, &mut state.previous[old]);
-                old += 1;
-            } else {
-                (candidate.memory.ids, candidate.memory.part) = (ids, *part);
-            }
-            (candidate.bodies, candidate.block) = (*bodies, *block);
-            state.candidates.push(candidate);
-        }
-        let (motions, bounds, bounds_of) = (&state.motions, &state.bounds, &state.bounds_of);
-        team.each_mut(&mut state.candidates, FILLED, |_, candidate| {
+        self.take_up_candidates(state);
+        let Stepping { motions, bounds_of, meetings, candidates, .. } = state;
+        let (motions, bounds_of, meetings) = (&*motions, &*bounds_of, &*meetings);
+        team.each_mut(candidates, FILLED, |place, candidate| {
+            candidate.block = meetings[place].block;
             let [a, b] = candidate.bodies;
             candidate.close = if a == b {
                 self.fill_block(candidate, motions, dt) && !self.are_fixed(&candidate.pair)
             } else {
-                let bounds = [a, b].map(|body| &bounds[bounds_of[body as usize]]);
-                self.fill(candidate, motions, bounds, dt)
+                let bounds = [a, b].map(|body| &bounds_of[body as usize]);
+                matches!(bounds, [Some(a), Some(b)] if self.fill(candidate, motions, [a, b], dt))
             };
             candidate.memory.touched = false;
         });
         // What no skeleton is close enough for goes back to where it came from.
         for candidate in state.candidates.extract_if(.., |candidate| !candidate.close) {
-            state.previous.push(candidate);
+            state.gone.push(candidate);
         }
     }
 
-    /// Bounds of all bodies, in their order; of one asleep, those of the last step.
-    fn find_bounds(&self, state: &mut Stepping, dt: f64) {
-        let now = (state.rest_revision, dt);
-        let slept = if state.bounded_for == now { &state.last_bounds[..] } else { &[] };
-        state.bounded_for = now;
-        let mut slept = slept.iter().peekable();
-        state.new_bounds.clear();
-        for index in self.bodies.indices() {
-            let body = &self.bodies[index];
-            while slept.next_if(|bounds| bounds.body < index as u32).is_some() {}
-            let last = slept.next_if(|bounds| bounds.body == index as u32);
-            match last.filter(|_| body.is_asleep()) {
-                _ if !body.enabled => {}
-                Some(last) => state.new_bounds.push(*last),
-                None => state.new_bounds.extend(self.bounds_of(index, &state.motions, dt)),
+    /// A candidate for each meeting: the last step's, or a new one.
+    fn take_up_candidates(&self, state: &mut Stepping) {
+        let Stepping { candidates, previous, gone, spare, meetings, .. } = state;
+        std::mem::swap(candidates, previous);
+        let mut last = previous.drain(..).peekable();
+        for Meeting { bodies, part, .. } in meetings.iter() {
+            let key = (*bodies, *part);
+            while let Some(old) = last.next_if(|last| last.key() < key) {
+                gone.push(old);
             }
+            // A body that took over the slot of a destroyed one is another body.
+            let ids = bodies.map(|body| self.bodies.id_of(body as usize).raw);
+            let known = last.next_if(|last| last.key() == key && last.memory.ids == ids);
+            candidates.push(known.unwrap_or_else(|| {
+                let mut new = spare.pop().unwrap_or_default();
+                new.memory.forget();
+                (new.bodies, new.memory.ids, new.memory.part) = (*bodies, ids, *part);
+                new
+            }));
         }
+        gone.extend(last);
+    }
+
+    /// Bounds of all bodies, in their order; of one asleep, those of the last step.
+    fn find_bounds(&self, state: &mut Stepping, dt: f64, team: &Team) {
+        let now = (state.rest_revision, dt);
+        let same = state.bounded_for == now;
+        state.bounded_for = now;
+        let Stepping { motions, bounds, bounds_of, .. } = state;
+        let motions = &*motions;
+        let count = self.bodies.capacity();
+        bounds_of.resize(count, None);
+        team.each_mut(bounds_of, team.share(count, BODIES), |slot, bounds| {
+            if !self.bodies.is_live(slot) || !self.bodies[slot].enabled {
+                *bounds = None;
+            } else if !(same && bounds.is_some() && self.bodies[slot].is_asleep()) {
+                *bounds = self.bounds_of(slot, motions, dt);
+            }
+        });
+        bounds.clear();
+        bounds.extend(bounds_of.iter().flatten());
     }
 
     /// Whether nothing of a pair can ever move.
@@ -453,7 +496,6 @@ impl World {
         }
         for group in &mut state.islands {
             group.island.links.clear();
-            group.island.candidates.clear();
             group.island.springs.clear();
             group.island.articulations.clear();
             group.supports.clear();
@@ -472,11 +514,10 @@ impl World {
             island_of[root as usize] as usize
         };
         state.owners.clear();
-        for (index, candidate) in state.candidates.iter().enumerate() {
+        for candidate in &state.candidates {
             let [a, b] = candidate.bodies;
             let root = find(&mut state.roots, if movable(a) { a } else { b });
             let island = island_for(root, &mut state.islands, &mut state.island_of);
-            state.islands[island].island.candidates.push(index as u32);
             state.owners.push(island as u32);
         }
         for body in self.bodies.indices() {
@@ -500,22 +541,22 @@ impl World {
                 state.islands[island as usize].island.articulations.push(index as u32);
             }
         }
-        for Group { island, supports, .. } in &mut state.islands[..count] {
-            for index in &island.candidates {
-                let candidate = &state.candidates[*index as usize];
-                for (body, side) in candidate.bodies.into_iter().zip([&candidate.pair.a, &candidate.pair.b]) {
-                    if movable(body) {
-                        continue;
-                    }
-                    supports.extend(&side.links);
-                    let moving = |link: &&u32| self.links[**link as usize].desc.kind == Kind::Host;
-                    for link in self.bodies[body as usize].links.iter().filter(moving) {
-                        if !island.links.contains(link) {
-                            island.links.push(*link);
-                        }
+        for (candidate, owner) in state.candidates.iter().zip(&state.owners) {
+            let Group { island, supports, .. } = &mut state.islands[*owner as usize];
+            for (body, side) in candidate.bodies.into_iter().zip([&candidate.pair.a, &candidate.pair.b]) {
+                if movable(body) {
+                    continue;
+                }
+                supports.extend(side.links.iter().copied().chain(candidate.pair.covers.iter().map(|cover| cover.link)));
+                let moving = |link: &&u32| self.links[**link as usize].desc.kind == Kind::Host;
+                for link in self.bodies[body as usize].links.iter().filter(moving) {
+                    if !island.links.contains(link) {
+                        island.links.push(*link);
                     }
                 }
             }
+        }
+        for Group { supports, .. } in &mut state.islands[..count] {
             supports.sort_unstable();
             supports.dedup();
         }
@@ -568,69 +609,64 @@ impl World {
         }
     }
 
-    /// Contacts and events.
-    fn report(&mut self, state: &mut Stepping) {
+    /// Contacts and events. What sleeps is at the front of the contacts.
+    fn report(&mut self, state: &mut Stepping, team: &Team) {
         self.keep_resting_contacts(state);
-        state.events.clear();
+        let Stepping { candidates, gone, spare, events, contacts, conclusions, contact_ends, .. } = state;
+        let (islands, owners) = (&state.islands, &state.owners);
+        events.clear();
         // Pairs that are no longer candidates cannot touch.
-        for mut gone in state.previous.drain(..) {
+        for mut gone in gone.drain(..) {
             if gone.memory.touching {
                 let bodies = gone.memory.ids.map(BodyId::from_raw);
-                state.events.push(Event { kind: EventKind::End, bodies });
+                events.push(Event { kind: EventKind::End, bodies });
             }
             gone.memory.forget();
-            state.spare.push(gone);
+            spare.push(gone);
         }
-        for (index, candidate) in state.candidates.iter_mut().enumerate() {
-            let bodies = candidate.bodies.map(|body| self.bodies.id_of(body as usize));
-            let first = state.contacts.len();
-            self.contacts_of(candidate, &mut state.contacts);
-            let overloaded = !candidate.surface.overloads.is_empty();
-            let touching = state.contacts.len() > first || overloaded;
-            let elastic_energy = candidate.elastic_energy();
-            let memory = &mut candidate.memory;
-            memory.ids = bodies.map(|body| body.raw);
-            let mut say = |kind| state.events.push(Event { kind, bodies });
-            match (memory.touching, touching) {
-                (false, true) => say(EventKind::Begin),
-                (true, false) => say(EventKind::End),
-                // It came and went within the step.
-                (false, false) if memory.touched => {
-                    say(EventKind::Begin);
-                    say(EventKind::End);
+        conclusions.resize(candidates.len(), Conclusion::default());
+        team.each_row(candidates, 1, conclusions, |index, candidates, conclusion| {
+            let implicit = islands[owners[index] as usize].outcome.rounds > 0;
+            *conclusion = Conclusion::of(&mut candidates[0], implicit);
+        });
+        let candidates = &*candidates;
+        let mut end = 0;
+        contact_ends.clear();
+        for (candidate, Conclusion { contacts, begins, ends, overloads }) in candidates.iter().zip(conclusions) {
+            end += *contacts;
+            contact_ends.push(end);
+            let mut say = |kind| events.push(Event { kind, bodies: candidate.memory.ids.map(BodyId::from_raw) });
+            for (happened, kind) in
+                [(*begins, EventKind::Begin), (*ends, EventKind::End), (*overloads, EventKind::Overload)]
+            {
+                if happened {
+                    say(kind);
                 }
-                _ => {}
             }
-            if memory.overloaded && !memory.was_overloaded {
-                say(EventKind::Overload);
-            }
-            memory.touching = touching;
-            let implicit = state.islands[state.owners[index] as usize].outcome.rounds > 0;
-            memory.held = if implicit { 0.0 } else { elastic_energy };
-            memory.was_overloaded = overloaded || memory.overloaded && touching;
-            memory.overloaded = false;
         }
-        state.contacts.extend_from_slice(&state.substance_contacts);
-        state.counters.patches = state.contacts.len() as u32;
+        contacts.resize(state.resting_contacts + end, Contact::default());
+        team.each_piece(&mut contacts[state.resting_contacts..], contact_ends, |index, contacts| {
+            for (place, contact) in contacts.iter_mut().zip(self.contacts_of(&candidates[index])) {
+                *place = contact;
+            }
+        });
+        contacts.extend_from_slice(&state.substance_contacts);
+        state.counters.patches = contacts.len() as u32;
     }
 
     /// The contacts of a candidate as they were last evaluated.
-    pub(super) fn contacts_of(&self, candidate: &Candidate, out: &mut Vec<Contact>) {
+    pub(super) fn contacts_of<'a>(&'a self, candidate: &'a Candidate) -> impl Iterator<Item = Contact> + 'a {
         let pair = &candidate.pair;
-        for (patch, sums) in candidate.surface.patches.iter().zip(&candidate.loads) {
-            let size = sums.force.norm();
-            if size <= 0.0 {
-                continue;
-            }
+        candidate.pressing().map(move |(patch, sums)| {
             let link = |side: &Side, index: usize| self.links.id_of(side.links[index] as usize);
             let skeleton = |side: &Side, index: usize| self.skeletons.id_of(side.ids[index] as usize);
             let [i, j] = patch.skeletons;
-            out.push(Contact {
+            Contact {
                 bodies: candidate.bodies.map(|body| self.bodies.id_of(body as usize)),
                 links: [link(&pair.a, i), link(&pair.b, j)],
                 skeletons: [skeleton(&pair.a, i), skeleton(&pair.b, j)],
                 position: pair.origin + sums.center,
-                normal: sums.force / size,
+                normal: sums.force.normalize(),
                 force: sums.force,
                 torque: sums.torque,
                 area: sums.area,
@@ -640,8 +676,8 @@ impl World {
                 evaluations: patch.evaluations,
                 scheme: patch.scheme,
                 overloaded: patch.overloaded,
-            });
-        }
+            }
+        })
     }
 
     /// The contacts of two bodies at their present poses, without stepping: the elastic forces alone. Of a body with
@@ -660,7 +696,7 @@ impl World {
             surface::integrate(&candidate.pair, &settings, &mut candidate.surface);
             candidate.loads.clear();
             candidate.loads.extend(candidate.surface.sums());
-            self.contacts_of(candidate, &mut contacts);
+            contacts.extend(self.contacts_of(candidate));
         };
         if a == b {
             let blocks = self.bodies[a.index()].blending.as_ref().map_or(0, |blending| blending.blocks.len());

@@ -30,7 +30,7 @@ impl World {
             return;
         }
         let awake = self.awake_regions(dt);
-        for bounds in &state.last_bounds {
+        for bounds in &state.bounds {
             let is_near = || awake.iter().any(|other| meet(&region(bounds), other));
             if sleep::is_asleep(&self.bodies, bounds.body) && is_near() {
                 sleep::rouse(&mut self.bodies, &state.resting, bounds.body);
@@ -90,7 +90,7 @@ impl World {
             body.sleep.group = regions[first].0 + 1;
             let particles = body.substance.iter_mut().flat_map(|substance| &mut substance.particles);
             particles.for_each(|particle| particle.velocity = Vec3::zeros());
-            for bounds in state.last_bounds.iter().filter(|bounds| meet(own, &region(bounds))) {
+            for bounds in state.bounds.iter().filter(|bounds| meet(own, &region(bounds))) {
                 let pair = [(*slot).min(bounds.body), (*slot).max(bounds.body)];
                 let ids = pair.map(|body| self.bodies.id_of(body as usize).raw);
                 state.resting.push(Memory { ids, ..Memory::default() });
@@ -101,7 +101,7 @@ impl World {
 
     /// Whether nobody in a region moves, is new, or has been changed.
     fn is_calm(&self, own: &Region, state: &Stepping) -> bool {
-        let mut near = state.last_bounds.iter().filter(|bounds| meet(own, &region(bounds)));
+        let mut near = state.bounds.iter().filter(|bounds| meet(own, &region(bounds)));
         near.all(|bounds| self.is_still(bounds.body, state))
     }
 }

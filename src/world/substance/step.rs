@@ -170,7 +170,7 @@ impl World {
     fn gather_obstacles(&mut self, system: &mut System, state: &mut Stepping, dt: f64) {
         let mut filter = self.pair_filter.get_mut().take();
         let mut old = std::mem::take(&mut system.obstacles).into_iter();
-        for bounds in &state.last_bounds {
+        for bounds in &state.bounds {
             let (slot, body) = (bounds.body, &self.bodies[bounds.body as usize]);
             let mut region: Option<(Vec3, Vec3)> = None;
             let mut materials = vec![None; system.swarm.matters.len()];
