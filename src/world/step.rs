@@ -365,15 +365,20 @@ impl World {
     fn take_up_candidates(&self, state: &mut Stepping) {
         let Stepping { candidates, previous, gone, spare, meetings, .. } = state;
         std::mem::swap(candidates, previous);
-        let mut last = previous.drain(..).peekable();
+        let mut left = previous.drain(..);
+        let mut next = left.next();
         for Meeting { bodies, part, .. } in meetings.iter() {
             let key = (*bodies, *part);
-            while let Some(old) = last.next_if(|last| last.key() < key) {
-                gone.push(old);
+            while let Some(last) = next.take_if(|last| last.key() < key) {
+                gone.push(last);
+                next = left.next();
             }
             // A body that took over the slot of a destroyed one is another body.
             let ids = bodies.map(|body| self.bodies.id_of(body as usize).raw);
-            let known = last.next_if(|last| last.key() == key && last.memory.ids == ids);
+            let known = next.take_if(|last| last.key() == key && last.memory.ids == ids);
+            if known.is_some() {
+                next = left.next();
+            }
             candidates.push(known.unwrap_or_else(|| {
                 let mut new = spare.pop().unwrap_or_default();
                 new.memory.forget();
@@ -381,7 +386,7 @@ impl World {
                 new
             }));
         }
-        gone.extend(last);
+        gone.extend(next.into_iter().chain(left));
     }
 
     /// Bounds of all bodies, in their order; of one asleep, those of the last step.
