@@ -409,20 +409,19 @@ fn has_two_cores() -> bool {
     fit
 }
 
-/// What two workers are worth, scene by scene. The goal is 1.7 times: what is solved as one island of few contacts falls
-/// short of it, since its conjugate gradients are one worker's.
+/// Today the wall and the balls that bounce are about there; the heaps are not: the conjugate gradients of one island are
+/// one worker's.
 #[test]
 #[ignore = "measures time: make workers"]
-fn two_workers_are_worth_it_on_125_bodies() {
+fn two_workers_are_nearly_twice_as_fast_on_125_bodies() {
     let mut slow = Vec::new();
-    // With how many times as fast it is at least.
-    let scenes: [(Scene, f64); 4] = [
-        (("120 cubes at rest in a wall", || settled(wall(15), 60), 100), 1.6),
-        (("125 balls that bounce", || bouncing(125), 200), 1.4),
-        (("125 balls at rest in a heap", || settled(heap(5), 300), 200), 1.3),
-        (("125 balls on their way into a heap", || heap(5), 200), 1.2),
+    let scenes: [Scene; 4] = [
+        ("125 balls at rest in a heap", || settled(heap(5), 300), 200),
+        ("125 balls on their way into a heap", || heap(5), 200),
+        ("125 balls that bounce", || bouncing(125), 200),
+        ("120 cubes at rest in a wall", || settled(wall(15), 60), 100),
     ];
-    for ((name, make, steps), least) in scenes {
+    for (name, make, steps) in scenes {
         // What was measured while somebody else had a core says nothing.
         let measured = (0..40).find_map(|_| {
             let medians = has_two_cores().then(|| paired_medians(make, steps))?;
@@ -434,11 +433,11 @@ fn two_workers_are_worth_it_on_125_bodies() {
         for (part, (one, two)) in ["step", "contact surfaces", "solve"].iter().zip(one.iter().zip(two)) {
             println!("    {part}: {:.2} ms, {:.2} ms: {:.2} times as fast", 1e3 * one, 1e3 * two, one / two);
         }
-        if one[0] < least * two[0] {
-            slow.push((name, least));
+        if one[0] < 1.7 * two[0] {
+            slow.push(name);
         }
     }
-    assert!(slow.is_empty(), "less than so many times: {slow:?}");
+    assert!(slow.is_empty(), "less than 1.7 times: {slow:?}");
 }
 
 #[test]
