@@ -4,7 +4,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
 
 use super::World;
 use super::events::{Counters, LogLevel};
-use super::step::{Group, Outcome, Stepping};
+use super::islands::{Group, Outcome};
+use super::step::Stepping;
 use crate::base::{Articulation, Kind, Motion};
 use crate::contact::surface;
 use crate::contact::tally::Tally;

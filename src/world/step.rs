@@ -2,31 +2,27 @@
 
 use std::sync::Mutex;
 
-use super::events::{Contact, Counters, Event, EventKind, LogLevel, Times};
+use super::candidates::Meeting;
+use super::events::{Contact, Counters, Event, LogLevel, Times};
+use super::islands::Group;
+use super::report::Conclusion;
 use super::respond::{Worker, unlocked};
 use super::volume::Control;
 use super::{BodyId, Link, World, units};
-use crate::base::{Articulation, Kind, Motion};
+use crate::base::{Kind, Motion};
 use crate::clock::Clock;
-use crate::coat::cliques::Block;
 use crate::contact::broad_phase::{Bounds, BroadPhase};
 use crate::contact::candidate::{Candidate, Kept, Memory};
-use crate::contact::pair::{Pair, Side};
 use crate::contact::surface;
 use crate::error::{Result, require};
-use crate::math::{Quat, Vec3, Wrench};
+use crate::math::Wrench;
 use crate::response::Response;
 use crate::response::mirror::Host;
-use crate::response::substep::Island;
 use crate::substance::system::System;
 use crate::team::Team;
 
-/// Least links, and bodies, that a worker takes in one go.
+/// Least links that a worker takes in one go.
 const LINKS: usize = 16;
-const BODIES: usize = 16;
-
-/// Candidates that a worker fills in one go.
-const FILLED: usize = 16;
 
 /// What the pipeline keeps between steps, and its buffers.
 #[derive(Default)]
@@ -39,15 +35,15 @@ pub(crate) struct Stepping {
     pub(super) bounds_of: Vec<Option<Bounds>>,
     pub(super) bounds: Vec<Bounds>,
     /// Who slept when they were found, as a revision, and the length of that step.
-    bounded_for: (u64, f64),
-    broad_phase: BroadPhase,
+    pub(super) bounded_for: (u64, f64),
+    pub(super) broad_phase: BroadPhase,
     pub(super) pairs: Vec<[u32; 2]>,
-    meetings: Vec<Meeting>,
+    pub(super) meetings: Vec<Meeting>,
     /// In the order of their bodies.
     pub(super) candidates: Vec<Kept>,
     /// Those of the last step, while these are found, and those that are none any more.
-    previous: Vec<Kept>,
-    gone: Vec<Kept>,
+    pub(super) previous: Vec<Kept>,
+    pub(super) gone: Vec<Kept>,
     pub(super) spare: Vec<Kept>,
     /// Of the pairs that are asleep, in the order of their bodies.
     pub(super) resting: Vec<Memory>,
@@ -61,8 +57,8 @@ pub(crate) struct Stepping {
     pub(super) controlled: Vec<(usize, Box<Control>)>,
     pub(super) islands: Vec<Group>,
     pub(super) island_count: usize,
-    roots: Vec<u32>,
-    island_of: Vec<u32>,
+    pub(super) roots: Vec<u32>,
+    pub(super) island_of: Vec<u32>,
     /// The island of each candidate.
     pub(super) owners: Vec<u32>,
     /// Contacts at the end of the last step, by slot of the body.
@@ -71,84 +67,13 @@ pub(crate) struct Stepping {
     pub(super) workers: Vec<Mutex<Worker>>,
     pub(super) contacts: Vec<Contact>,
     /// Of each candidate, what is to be said, and the end of its contacts behind those asleep.
-    conclusions: Vec<Conclusion>,
-    contact_ends: Vec<usize>,
+    pub(super) conclusions: Vec<Conclusion>,
+    pub(super) contact_ends: Vec<usize>,
     pub(super) system: System,
     pub(super) substance_contacts: Vec<Contact>,
-    events: Vec<Event>,
+    pub(super) events: Vec<Event>,
     pub(super) counters: Counters,
     pub(super) times: Times,
-}
-
-/// Two bodies, or two parts of one body by the first skeleton of each, and which of its blocks these are.
-#[derive(Clone, Copy, Debug)]
-struct Meeting {
-    bodies: [u32; 2],
-    part: [u32; 2],
-    block: u32,
-}
-
-/// An island, and what the world notes about it.
-#[derive(Debug, Default)]
-pub(super) struct Group {
-    pub island: Island,
-    pub response: Response,
-    /// The world or a body asks for it.
-    pub forced: bool,
-    /// Sub-steps that it asks for.
-    pub substeps: f64,
-    /// Links that it leans on: they do not move, and other islands may lean on them too.
-    pub supports: Vec<u32>,
-    /// The contact impulses that they got from it.
-    pub carried: Vec<Wrench>,
-    /// Its own candidates, while it is stepped.
-    pub candidates: Vec<Kept>,
-    /// Links that the host moves whatever happens, with the poses that they start from.
-    pub driven: Vec<(u32, (Vec3, Quat))>,
-    /// It is stepped beside others, by which worker, and what came out.
-    pub beside: bool,
-    pub worker: usize,
-    pub outcome: Outcome,
-}
-
-/// What is to be said of a candidate at the end of a step.
-#[derive(Clone, Copy, Debug, Default)]
-struct Conclusion {
-    contacts: usize,
-    begins: bool,
-    ends: bool,
-    overloads: bool,
-}
-
-impl Conclusion {
-    /// What happened, noted in the candidate's memory too.
-    fn of(candidate: &mut Candidate, implicit: bool) -> Self {
-        let overloaded = !candidate.surface.overloads.is_empty();
-        let contacts = candidate.pressing().count();
-        let touching = contacts > 0 || overloaded;
-        let held = if implicit { 0.0 } else { candidate.elastic_energy() };
-        let memory = &mut candidate.memory;
-        // It may have come and gone within the step.
-        let passed = !memory.touching && !touching && memory.touched;
-        let conclusion = Self {
-            contacts,
-            begins: !memory.touching && touching || passed,
-            ends: memory.touching && !touching || passed,
-            overloads: memory.overloaded && !memory.was_overloaded,
-        };
-        (memory.touching, memory.held) = (touching, held);
-        memory.was_overloaded = overloaded || memory.overloaded && touching;
-        memory.overloaded = false;
-        conclusion
-    }
-}
-
-/// What stepping an island took.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Outcome {
-    pub substeps: u32,
-    pub rounds: u32,
-    pub splits: u32,
 }
 
 impl Stepping {
@@ -325,137 +250,6 @@ impl World {
         }
     }
 
-    /// Pairs of bodies whose bounds meet and that may touch.
-    fn find_candidates(&mut self, state: &mut Stepping, dt: f64, team: &Team) {
-        self.find_bounds(state, dt, team);
-        state.pairs.clear();
-        self.take_up_memories(state);
-        if !self.all_rest(state) {
-            state.broad_phase.find(&state.bounds, &mut state.pairs);
-            self.wake_touched(state, dt);
-            let mut filter = self.pair_filter.get_mut().take();
-            state.pairs.retain(|pair| {
-                let asleep = pair.iter().any(|body| self.bodies[*body as usize].is_asleep());
-                !asleep && self.may_touch(pair, &state.motions, &mut filter)
-            });
-            *self.pair_filter.get_mut() = filter;
-        }
-        self.list_meetings(state);
-        self.take_up_candidates(state);
-        let Stepping { motions, bounds_of, meetings, candidates, .. } = state;
-        let (motions, bounds_of, meetings) = (&*motions, &*bounds_of, &*meetings);
-        team.each_mut(candidates, FILLED, |place, candidate| {
-            candidate.block = meetings[place].block;
-            let [a, b] = candidate.bodies;
-            candidate.close = if a == b {
-                self.fill_block(candidate, motions, dt) && !self.are_fixed(&candidate.pair)
-            } else {
-                let bounds = [a, b].map(|body| &bounds_of[body as usize]);
-                matches!(bounds, [Some(a), Some(b)] if self.fill(candidate, motions, [a, b], dt))
-            };
-            candidate.memory.touched = false;
-        });
-        // What no skeleton is close enough for goes back to where it came from.
-        for candidate in state.candidates.extract_if(.., |candidate| !candidate.close) {
-            state.gone.push(candidate);
-        }
-    }
-
-    /// A candidate for each meeting: the last step's, or a new one.
-    fn take_up_candidates(&self, state: &mut Stepping) {
-        let Stepping { candidates, previous, gone, spare, meetings, .. } = state;
-        std::mem::swap(candidates, previous);
-        let mut left = previous.drain(..);
-        let mut next = left.next();
-        for Meeting { bodies, part, .. } in meetings.iter() {
-            let key = (*bodies, *part);
-            while let Some(last) = next.take_if(|last| last.key() < key) {
-                gone.push(last);
-                next = left.next();
-            }
-            // A body that took over the slot of a destroyed one is another body.
-            let ids = bodies.map(|body| self.bodies.id_of(body as usize).raw);
-            let known = next.take_if(|last| last.key() == key && last.memory.ids == ids);
-            if known.is_some() {
-                next = left.next();
-            }
-            candidates.push(known.unwrap_or_else(|| {
-                let mut new = spare.pop().unwrap_or_default();
-                new.memory.forget();
-                (new.bodies, new.memory.ids, new.memory.part) = (*bodies, ids, *part);
-                new
-            }));
-        }
-        gone.extend(next.into_iter().chain(left));
-    }
-
-    /// Bounds of all bodies, in their order; of one asleep, those of the last step.
-    fn find_bounds(&self, state: &mut Stepping, dt: f64, team: &Team) {
-        let now = (state.rest_revision, dt);
-        let same = state.bounded_for == now;
-        state.bounded_for = now;
-        let Stepping { motions, bounds, bounds_of, .. } = state;
-        let motions = &*motions;
-        let count = self.bodies.capacity();
-        bounds_of.resize(count, None);
-        team.each_mut(bounds_of, team.share(count, BODIES), |slot, bounds| {
-            if !self.bodies.is_live(slot) || !self.bodies[slot].enabled {
-                *bounds = None;
-            } else if !(same && bounds.is_some() && self.bodies[slot].is_asleep()) {
-                *bounds = self.bounds_of(slot, motions, dt);
-            }
-        });
-        bounds.clear();
-        bounds.extend(bounds_of.iter().flatten());
-    }
-
-    /// Whether nothing of a pair can ever move.
-    fn are_fixed(&self, pair: &Pair) -> bool {
-        let mut links = pair.a.links.iter().chain(&pair.b.links);
-        links.all(|link| self.links[*link as usize].desc.kind == Kind::Fixed)
-    }
-
-    /// What may meet: pairs of bodies, and of parts that collide of one body, in order.
-    fn list_meetings(&self, state: &mut Stepping) {
-        state.meetings.clear();
-        state.meetings.extend(state.pairs.iter().map(|bodies| Meeting { bodies: *bodies, part: [0; 2], block: 0 }));
-        let between = state.meetings.len();
-        for slot in self.bodies.indices() {
-            let body = &self.bodies[slot];
-            let Some(blending) = body.blending.as_ref().filter(|_| body.enabled && !body.is_asleep()) else { continue };
-            for (block, Block { sides, .. }) in blending.blocks.iter().enumerate() {
-                let part = [&sides[0], &sides[1]].map(|side| blending.order[side[0] as usize]);
-                state.meetings.push(Meeting { bodies: [slot as u32; 2], part, block: block as u32 });
-            }
-        }
-        if state.meetings.len() > between {
-            state.meetings.sort_unstable_by_key(|meeting| (meeting.bodies, meeting.part));
-        }
-    }
-
-    pub(super) fn may_touch(
-        &self,
-        pair: &[u32; 2],
-        motions: &[Motion],
-        filter: &mut Option<super::PairFilter>,
-    ) -> bool {
-        let [a, b] = pair.map(|body| &self.bodies[body as usize]);
-        // A host-driven kinematic link may still have its wrench asked for: only bodies that are fixed all over are
-        // skipped.
-        let still = |body: &super::Body| {
-            body.links.iter().all(|link| {
-                self.links[*link as usize].desc.kind == Kind::Fixed && !motions[*link as usize].is_movable()
-            })
-        };
-        a.desc.mask & b.desc.category != 0
-            && b.desc.mask & a.desc.category != 0
-            && !(still(a) && still(b))
-            && filter.as_mut().is_none_or(|filter| {
-                let [a, b] = pair.map(|body| self.bodies.id_of(body as usize));
-                filter(a, b)
-            })
-    }
-
     /// Says once a body when its units cannot work.
     fn check_units(&mut self, state: &Stepping, dt: f64) {
         let Some(mut log) = self.log.get_mut().take() else { return };
@@ -466,105 +260,6 @@ impl World {
             }
         }
         *self.log.get_mut() = Some(log);
-    }
-
-    /// Islands: bodies that touch, directly or through others that can move.
-    fn group(&self, state: &mut Stepping) {
-        let bodies = self.bodies.capacity();
-        state.roots.clear();
-        state.roots.extend(0..bodies as u32);
-        fn find(roots: &mut [u32], mut body: u32) -> u32 {
-            while roots[body as usize] != body {
-                roots[body as usize] = roots[roots[body as usize] as usize];
-                body = roots[body as usize];
-            }
-            body
-        }
-        let movable = |body: u32| {
-            let body = &self.bodies[body as usize];
-            !body.is_asleep() && body.links.iter().any(|link| state.motions[*link as usize].is_movable())
-        };
-        for candidate in &state.candidates {
-            let [a, b] = candidate.bodies;
-            if movable(a) && movable(b) {
-                let (a, b) = (find(&mut state.roots, a), find(&mut state.roots, b));
-                state.roots[a.max(b) as usize] = a.min(b);
-            }
-        }
-        for Articulation { links, .. } in &self.articulations {
-            let mut bodies = links.iter().map(|link| self.links[*link as usize].body).filter(|body| movable(*body));
-            let Some(first) = bodies.next() else { continue };
-            for body in bodies {
-                let (a, b) = (find(&mut state.roots, first), find(&mut state.roots, body));
-                state.roots[a.max(b) as usize] = a.min(b);
-            }
-        }
-        for group in &mut state.islands {
-            group.island.links.clear();
-            group.island.springs.clear();
-            group.island.articulations.clear();
-            group.supports.clear();
-        }
-        state.island_of.clear();
-        state.island_of.resize(bodies, u32::MAX);
-        let mut count = 0;
-        let mut island_for = |root: u32, islands: &mut Vec<Group>, island_of: &mut [u32]| {
-            if island_of[root as usize] == u32::MAX {
-                island_of[root as usize] = count as u32;
-                count += 1;
-                if islands.len() < count {
-                    islands.push(Group::default());
-                }
-            }
-            island_of[root as usize] as usize
-        };
-        state.owners.clear();
-        for candidate in &state.candidates {
-            let [a, b] = candidate.bodies;
-            let root = find(&mut state.roots, if movable(a) { a } else { b });
-            let island = island_for(root, &mut state.islands, &mut state.island_of);
-            state.owners.push(island as u32);
-        }
-        for body in self.bodies.indices() {
-            if !self.bodies[body].enabled {
-                continue;
-            }
-            // A kinematic body touched only by others is drifted in each of their islands; see `respond`.
-            if movable(body as u32) {
-                let root = find(&mut state.roots, body as u32);
-                let island = island_for(root, &mut state.islands, &mut state.island_of);
-                let island = &mut state.islands[island].island;
-                island.links.extend(&self.bodies[body].links);
-                self.gather_springs(&self.bodies[body], &state.motions, &mut island.springs);
-            }
-        }
-        state.island_count = count;
-        for (index, Articulation { links, .. }) in self.articulations.iter().enumerate() {
-            let mut bodies = links.iter().map(|link| self.links[*link as usize].body);
-            if let Some(body) = bodies.find(|body| movable(*body) && self.bodies[*body as usize].enabled) {
-                let island = state.island_of[find(&mut state.roots, body) as usize];
-                state.islands[island as usize].island.articulations.push(index as u32);
-            }
-        }
-        for (candidate, owner) in state.candidates.iter().zip(&state.owners) {
-            let Group { island, supports, .. } = &mut state.islands[*owner as usize];
-            for (body, side) in candidate.bodies.into_iter().zip([&candidate.pair.a, &candidate.pair.b]) {
-                if movable(body) {
-                    continue;
-                }
-                supports.extend(side.links.iter().copied().chain(candidate.pair.covers.iter().map(|cover| cover.link)));
-                let moving = |link: &&u32| self.links[**link as usize].desc.kind == Kind::Host;
-                for link in self.bodies[body as usize].links.iter().filter(moving) {
-                    if !island.links.contains(link) {
-                        island.links.push(*link);
-                    }
-                }
-            }
-        }
-        for Group { supports, .. } in &mut state.islands[..count] {
-            supports.sort_unstable();
-            supports.dedup();
-        }
     }
 
     /// Writes back what moved, and what the host is to do.
@@ -612,77 +307,6 @@ impl World {
             gyroscopic: link.desc.host_gyroscopic,
             teleport: 0.5 * self.thinnest(link),
         }
-    }
-
-    /// Contacts and events. What sleeps is at the front of the contacts.
-    fn report(&mut self, state: &mut Stepping, team: &Team) {
-        self.keep_resting_contacts(state);
-        let Stepping { candidates, gone, spare, events, contacts, conclusions, contact_ends, .. } = state;
-        let (islands, owners) = (&state.islands, &state.owners);
-        events.clear();
-        // Pairs that are no longer candidates cannot touch.
-        for mut gone in gone.drain(..) {
-            if gone.memory.touching {
-                let bodies = gone.memory.ids.map(BodyId::from_raw);
-                events.push(Event { kind: EventKind::End, bodies });
-            }
-            gone.memory.forget();
-            spare.push(gone);
-        }
-        conclusions.resize(candidates.len(), Conclusion::default());
-        team.each_row(candidates, 1, conclusions, |index, candidates, conclusion| {
-            let implicit = islands[owners[index] as usize].outcome.rounds > 0;
-            *conclusion = Conclusion::of(&mut candidates[0], implicit);
-        });
-        let candidates = &*candidates;
-        let mut end = 0;
-        contact_ends.clear();
-        for (candidate, Conclusion { contacts, begins, ends, overloads }) in candidates.iter().zip(conclusions) {
-            end += *contacts;
-            contact_ends.push(end);
-            let mut say = |kind| events.push(Event { kind, bodies: candidate.memory.ids.map(BodyId::from_raw) });
-            for (happened, kind) in
-                [(*begins, EventKind::Begin), (*ends, EventKind::End), (*overloads, EventKind::Overload)]
-            {
-                if happened {
-                    say(kind);
-                }
-            }
-        }
-        contacts.resize(state.resting_contacts + end, Contact::default());
-        team.each_piece(&mut contacts[state.resting_contacts..], contact_ends, |index, contacts| {
-            for (place, contact) in contacts.iter_mut().zip(self.contacts_of(&candidates[index])) {
-                *place = contact;
-            }
-        });
-        contacts.extend_from_slice(&state.substance_contacts);
-        state.counters.patches = contacts.len() as u32;
-    }
-
-    /// The contacts of a candidate as they were last evaluated.
-    pub(super) fn contacts_of<'a>(&'a self, candidate: &'a Candidate) -> impl Iterator<Item = Contact> + 'a {
-        let pair = &candidate.pair;
-        candidate.pressing().map(move |(patch, sums)| {
-            let link = |side: &Side, index: usize| self.links.id_of(side.links[index] as usize);
-            let skeleton = |side: &Side, index: usize| self.skeletons.id_of(side.ids[index] as usize);
-            let [i, j] = patch.skeletons;
-            Contact {
-                bodies: candidate.bodies.map(|body| self.bodies.id_of(body as usize)),
-                links: [link(&pair.a, i), link(&pair.b, j)],
-                skeletons: [skeleton(&pair.a, i), skeleton(&pair.b, j)],
-                position: pair.origin + sums.center,
-                normal: sums.force.normalize(),
-                force: sums.force,
-                torque: sums.torque,
-                area: sums.area,
-                peak_pressure: patch.peak_pressure,
-                stiffness: sums.stiffness,
-                error_estimate: patch.error_estimate,
-                evaluations: patch.evaluations,
-                scheme: patch.scheme,
-                overloaded: patch.overloaded,
-            }
-        })
     }
 
     /// The contacts of two bodies at their present poses, without stepping: the elastic forces alone. Of a body with
