@@ -148,6 +148,10 @@ impl Side {
                 let rise = legs.map(|leg| closest.normal.dot(&leg));
                 let fall = rise.iter().map(|rise| rise.abs()).sum::<f64>();
                 least = least.max(closest.distance - rise[0] * x - rise[1] * y - fall);
+                // Most skeletons are out of reach, as the first place shows.
+                if least >= skeleton.profile.radius {
+                    return 0.0;
+                }
             }
             let solid = matches!(skeleton.shape, Shape::Box { .. } | Shape::Plane { .. });
             skeleton.profile.value_slope(if solid { least } else { least.max(0.0) }).0
@@ -356,7 +360,8 @@ impl Pair {
         let share = |side: &Side, weight: f64| {
             if weight > 0.0 { (side.most(center, legs) - taken) / weight } else { f64::INFINITY }
         };
-        share(&self.a, self.wb).min(share(&self.b, self.wa))
+        let first = share(&self.a, self.wb);
+        if first <= 0.0 { first } else { first.min(share(&self.b, self.wa)) }
     }
 
     /// The part of `-∇Φ` that the partner of a ray's body brings: `w_b ∇β` for a's rays, `w_a ∇α` for b's.
