@@ -47,9 +47,20 @@ pub(crate) fn out_of_range(what: &'static str, value: impl std::fmt::Display, ra
     Error::OutOfRange { what, value: value.to_string(), range }
 }
 
+/// A number that takes few characters, however large or small it is: hosts have short buffers.
+struct Short(f64);
+
+impl std::fmt::Display for Short {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self(value) = self;
+        let is_plain = *value == 0.0 || !value.is_finite() || (1e-5..1e16).contains(&value.abs());
+        if is_plain { write!(f, "{value}") } else { write!(f, "{value:e}") }
+    }
+}
+
 /// Accepts a finite number for which `ok` holds.
 pub(crate) fn require(what: &'static str, value: f64, range: &'static str, ok: impl Fn(f64) -> bool) -> Result<()> {
-    if value.is_finite() && ok(value) { Ok(()) } else { Err(out_of_range(what, value, range)) }
+    if value.is_finite() && ok(value) { Ok(()) } else { Err(out_of_range(what, Short(value), range)) }
 }
 
 /// Accepts a vector of finite numbers whose powers are finite too.
@@ -57,6 +68,7 @@ pub(crate) fn require_finite(what: &'static str, v: &crate::math::Vec3) -> Resul
     if v.iter().all(|x| x.abs() <= 1e60) {
         Ok(())
     } else {
-        Err(out_of_range(what, format_args!("({}, {}, {})", v.x, v.y, v.z), "finite, at most 1e60"))
+        let [x, y, z] = [v.x, v.y, v.z].map(Short);
+        Err(out_of_range(what, format_args!("({x}, {y}, {z})"), "finite, at most 1e60"))
     }
 }

@@ -440,7 +440,7 @@ fn values_out_of_range_are_refused_though_the_checksum_is_right() {
         assert!(reason.contains(expected), "{number} -> {instead}: {reason}");
     };
     refused(0.1875, 2.0, "settings: substep_phase is 2; must be from 0.01 to 1");
-    refused(0.21, -1.0, "body 0: friction is -1; must be finite and at least 0");
+    refused(0.21, -1.0, "body 0: friction is -1; must be from 0 to 1e6");
     refused(3.5, -3.0, "link 0: mass of a rigid link is -3; must be > 0");
     refused(0.77, f64::NAN, "link 0: position is (NaN, 0, 0); must be finite");
     refused(0.55, f64::INFINITY, "link 0: angular_velocity is (inf, 0, 0); must be finite");

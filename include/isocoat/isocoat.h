@@ -279,7 +279,8 @@ typedef uint32_t isocoat_response;
 #define ISOCOAT_RESPONSE_EXPLICIT 1u
 /**
  * Velocities and forces of all links in contact that agree at the end of the step: stable at any stiffness and mass,
- * exact at rest; contacts do not bounce.
+ * exact at rest; contacts do not bounce. Momentum is kept; angular momentum changes by dt times the cross product of
+ * the speed at which two bodies leave each other and their impulse, which matters for oblique blows in free flight.
  */
 #define ISOCOAT_RESPONSE_IMPLICIT 2u
 /**
@@ -546,14 +547,14 @@ typedef struct isocoat_body_desc {
     double isovalue;
     /** Pressure a unit of field, in Pa, > 0 and at most 1e18. Default 1e5. */
     double stiffness_scale;
-    /** Coefficient of Coulomb friction, at least 0; a pair takes the geometric mean. Default 0. */
+    /** Coefficient of Coulomb friction, from 0 to 1e6; a pair takes the geometric mean. Default 0. */
     double friction;
-    /** Coefficient of static friction: 0 (off), or at least friction; a pair takes the geometric mean. Default 0. */
+    /** Coefficient of static friction: 0 (off), or from friction to 1e6; a pair takes the geometric mean. Default 0. */
     double static_friction;
-    /** Viscous friction, in sqrt(N s/m^3), at least 0; a pair takes the product. Default 0. */
+    /** Viscous friction, in sqrt(N s/m^3), from 0 to 1e6; a pair takes the product. Default 0. */
     double viscous_friction;
     /**
-     * Hunt-Crossley dissipation, in s/m, at least 0; a pair takes the mean weighted by the other's stiffness.
+     * Hunt-Crossley dissipation, in s/m, from 0 to 1e6; a pair takes the mean weighted by the other's stiffness.
      * Default 0.
      */
     double dissipation;
@@ -573,7 +574,10 @@ typedef struct isocoat_body_desc {
     isocoat_response response;
     /** How its stiffness is said. Default ISOCOAT_STIFFNESS_SCALE. */
     isocoat_stiffness_rule stiffness_rule;
-    /** With ISOCOAT_STIFFNESS_SINK: sink under its own weight over the thickness, > 0 and at most 0.5. Default 0.05. */
+    /**
+     * With ISOCOAT_STIFFNESS_SINK: sink under its own weight over the thickness, > 0 and at most 0.5. Default 0.05.
+     * A box is taken to lie on its flat face: where its coat is thick, the rounded rim bears too, and it sinks less.
+     */
     double static_sink;
     /**
      * With ISOCOAT_STIFFNESS_FREQUENCY: frequency of small swings on its contact, in Hz, > 0 and at most 1e6.
@@ -1887,7 +1891,7 @@ typedef struct isocoat_contact {
     double position[3];
     /** Mean normal, from a to b. */
     double normal[3];
-    /** Force on b, in N; a has the opposite. */
+    /** Force on b of pressure and dissipation, in N; a has the opposite. Friction is in the wrenches of links only. */
     double force[3];
     /** Torque on b about position, in N m; a has the opposite. */
     double torque[3];

@@ -43,13 +43,13 @@ pub struct isocoat_body_desc {
     pub isovalue: f64,
     /// Pressure a unit of field, in Pa, > 0 and at most 1e18. Default 1e5.
     pub stiffness_scale: f64,
-    /// Coefficient of Coulomb friction, at least 0; a pair takes the geometric mean. Default 0.
+    /// Coefficient of Coulomb friction, from 0 to 1e6; a pair takes the geometric mean. Default 0.
     pub friction: f64,
-    /// Coefficient of static friction: 0 (off), or at least friction; a pair takes the geometric mean. Default 0.
+    /// Coefficient of static friction: 0 (off), or from friction to 1e6; a pair takes the geometric mean. Default 0.
     pub static_friction: f64,
-    /// Viscous friction, in sqrt(N s/m^3), at least 0; a pair takes the product. Default 0.
+    /// Viscous friction, in sqrt(N s/m^3), from 0 to 1e6; a pair takes the product. Default 0.
     pub viscous_friction: f64,
-    /// Hunt-Crossley dissipation, in s/m, at least 0; a pair takes the mean weighted by the other's stiffness.
+    /// Hunt-Crossley dissipation, in s/m, from 0 to 1e6; a pair takes the mean weighted by the other's stiffness.
     /// Default 0.
     pub dissipation: f64,
     /// What this body is, as bits. Default 1.
@@ -65,6 +65,7 @@ pub struct isocoat_body_desc {
     /// How its stiffness is said. Default ISOCOAT_STIFFNESS_SCALE.
     pub stiffness_rule: isocoat_stiffness_rule,
     /// With ISOCOAT_STIFFNESS_SINK: sink under its own weight over the thickness, > 0 and at most 0.5. Default 0.05.
+    /// A box is taken to lie on its flat face: where its coat is thick, the rounded rim bears too, and it sinks less.
     pub static_sink: f64,
     /// With ISOCOAT_STIFFNESS_FREQUENCY: frequency of small swings on its contact, in Hz, > 0 and at most 1e6.
     /// Default 10.

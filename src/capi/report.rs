@@ -34,7 +34,7 @@ pub struct isocoat_contact {
     pub position: [f64; 3],
     /// Mean normal, from a to b.
     pub normal: [f64; 3],
-    /// Force on b, in N; a has the opposite.
+    /// Force on b of pressure and dissipation, in N; a has the opposite. Friction is in the wrenches of links only.
     pub force: [f64; 3],
     /// Torque on b about position, in N m; a has the opposite.
     pub torque: [f64; 3],

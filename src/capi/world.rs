@@ -19,7 +19,8 @@ pub const ISOCOAT_RESPONSE_AUTO: isocoat_response = 0;
 /// One evaluation of the forces a step, at its beginning: for small steps only. Overloads are stepped implicitly.
 pub const ISOCOAT_RESPONSE_EXPLICIT: isocoat_response = 1;
 /// Velocities and forces of all links in contact that agree at the end of the step: stable at any stiffness and mass,
-/// exact at rest; contacts do not bounce.
+/// exact at rest; contacts do not bounce. Momentum is kept; angular momentum changes by dt times the cross product of
+/// the speed at which two bodies leave each other and their impulse, which matters for oblique blows in free flight.
 pub const ISOCOAT_RESPONSE_IMPLICIT: isocoat_response = 2;
 /// Many small steps inside each step; host-driven links through a mirror that lasts from step to step. What is pressed
 /// past the most that its coats carry, or asks for more than max_substeps, is stepped implicitly all the same.

@@ -142,6 +142,12 @@ impl Candidate {
         self.memory.standing.velocity(&self.pair, link, &motions[link as usize], h)
     }
 
+    /// The centre of a link from which its arms to the surface go.
+    pub fn center_looked_at(&self, link: u32, motions: &[Motion]) -> Vec3 {
+        let motion = &motions[link as usize];
+        if self.fresh { motion.center } else { self.memory.standing.center(&self.pair, link, motion) }
+    }
+
     /// The patches that press, with what they came to.
     pub fn pressing(&self) -> impl Iterator<Item = (&Patch, &Sums)> {
         self.surface.patches.iter().zip(&self.loads).filter(|(_, load)| load.force != Vec3::zeros())

@@ -122,6 +122,14 @@ impl Standing {
         });
     }
 
+    /// The centre of mass of a link, from which its arms to the surface go; of a round one, where it was.
+    ///
+    /// A ball takes its contact along as it rolls. If the force stayed where it was, it would lag behind the ball that it
+    /// bears, and make it roll faster and faster.
+    pub fn center(&self, pair: &Pair, link: u32, motion: &Motion) -> Vec3 {
+        self.of(link).filter(|_| is_round(pair, link, motion)).map_or(motion.center, |place| place.center)
+    }
+
     /// The velocity that would take the coat of a link in `h` seconds from where it is to where it was.
     pub fn velocity(&self, pair: &Pair, link: u32, motion: &Motion, h: f64) -> Twist {
         let Some(place) = self.of(link) else { return motion.twist };

@@ -104,7 +104,10 @@ impl Grouping<'_> {
         sharing.each_kind(nodes, |nodes, shares| {
             let (first_point, first_member) = (points.count(), members.len());
             let center = points.extend(nodes);
-            members.extend(shares.iter().map(|share| member(trial, pair, &center, *share)));
+            members.extend(shares.iter().map(|share| Member {
+                arm: center - (candidate.center_looked_at(share.link, trial) - pair.origin),
+                ..member(trial, pair, &center, *share)
+            }));
             let own = &members[first_member..];
             let base =
                 (!candidate.fresh).then(|| relative(own, |link| candidate.velocity_looked_at(link, motions, *h)));

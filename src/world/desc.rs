@@ -123,13 +123,13 @@ pub struct BodyDesc {
     pub stiffness_scale: f64,
     /// Another way to say how stiff it is, by which `K` is worked out.
     pub stiffness: StiffnessRule,
-    /// Coefficient of Coulomb friction, at least 0; a pair uses the geometric mean.
+    /// Coefficient of Coulomb friction, from 0 to 1e6; a pair uses the geometric mean.
     pub friction: f64,
-    /// Coefficient of static friction: 0, or at least `friction`; a pair uses the geometric mean.
+    /// Coefficient of static friction: 0, or from `friction` to 1e6; a pair uses the geometric mean.
     pub static_friction: f64,
-    /// Viscous friction `λ`, at least 0 \[√(N s/m³)\]; a pair uses the product \[97, eq. (20)\].
+    /// Viscous friction `λ`, from 0 to 1e6 \[√(N s/m³)\]; a pair uses the product \[97, eq. (20)\].
     pub viscous_friction: f64,
-    /// Hunt-Crossley dissipation, at least 0 \[s/m\]; a pair uses the mean weighted by the other's stiffness.
+    /// Hunt-Crossley dissipation, from 0 to 1e6 \[s/m\]; a pair uses the mean weighted by the other's stiffness.
     pub dissipation: f64,
     /// What this body is, as bits.
     pub category: u64,
@@ -181,7 +181,7 @@ impl Default for BodyDesc {
 
 impl BodyDesc {
     pub(crate) fn validate(&self) -> Result<()> {
-        let not_negative = |what, value| require(what, value, "finite and at least 0", |x| x >= 0.0);
+        let coefficient = |what, value| require(what, value, "from 0 to 1e6", |x| (0.0..=1e6).contains(&x));
         require("isovalue", self.isovalue, "> 0 and at most 1e9", |x| x > 1e-9 && x <= 1e9)?;
         require("stiffness_scale", self.stiffness_scale, "> 0 and at most 1e18", |x| x > 0.0 && x <= 1e18)?;
         match self.stiffness {
@@ -194,15 +194,15 @@ impl BodyDesc {
                 require("damping_ratio", damping_ratio, "from 0 to 10", |x| (0.0..=10.0).contains(&x))?;
             }
         }
-        not_negative("friction", self.friction)?;
-        not_negative("viscous_friction", self.viscous_friction)?;
+        coefficient("friction", self.friction)?;
+        coefficient("viscous_friction", self.viscous_friction)?;
         require("blend_band", self.blend_band, "from 0 to 0.5", |x| (0.0..=0.5).contains(&x))?;
-        not_negative("dissipation", self.dissipation)?;
+        coefficient("dissipation", self.dissipation)?;
         require("volume_gain", self.volume_gain, "from 0 (off) to 0.5", |x| (0.0..=0.5).contains(&x))?;
         require("bulge_width", self.bulge_width, "from 0 to 1", |x| (0.0..=1.0).contains(&x))?;
         require("bulge_height", self.bulge_height, "from 0 to 1e6", |x| (0.0..=1e6).contains(&x))?;
-        require("static_friction", self.static_friction, "0 (off), or at least friction", |x| {
-            x == 0.0 || x >= self.friction.max(0.0) && x > 0.0
+        require("static_friction", self.static_friction, "0 (off), or from friction to 1e6", |x| {
+            x == 0.0 || x > 0.0 && (self.friction..=1e6).contains(&x)
         })
     }
 }

@@ -17,7 +17,7 @@ pub struct Contact {
     pub position: Vec3,
     /// Mean normal, from a to b.
     pub normal: Vec3,
-    /// Force on b; a has the opposite \[N\].
+    /// Force on b of pressure and dissipation; a has the opposite \[N\]. Friction is in the wrenches of links only.
     pub force: Vec3,
     /// Torque on b about `position`; a has the opposite \[N m\].
     pub torque: Vec3,

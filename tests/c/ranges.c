@@ -76,12 +76,15 @@ static void bodies(void)
     BODY(stiffness_scale, 0.0, range, "stiffness_scale is 0; must be > 0");
     BODY(stiffness_scale, 1e19, range, "stiffness_scale is 1");
     BODY(stiffness_scale, INFINITY, range, "stiffness_scale is inf");
-    BODY(friction, -0.5, range, "friction is -0.5; must be finite and at least 0");
+    BODY(friction, -0.5, range, "friction is -0.5; must be from 0 to 1e6");
+    BODY(friction, 1e300, range, "friction is 1e300; must be from 0 to 1e6");
+    BODY(viscous_friction, 1e12, range, "viscous_friction is 1e12; must be from 0 to 1e6");
+    BODY(dissipation, 1e155, range, "dissipation is 1e155; must be from 0 to 1e6");
     BODY(friction, NAN, range, "friction is NaN");
     BODY(viscous_friction, -1.0, range, "viscous_friction is -1");
     BODY(dissipation, INFINITY, range, "dissipation is inf");
     BODY(static_friction, -1.0, range, "static_friction is -1");
-    BODY(static_friction, 0.125, range, "static_friction is 0.125; must be 0 (off), or at least friction");
+    BODY(static_friction, 0.125, range, "static_friction is 0.125; must be 0 (off), or from friction to 1e6");
     /* The skeleton's stiffness of 10 over its width of 0.2 m asks for an isovalue of at least 2/3. */
     desc.isovalue = 0.5;
     REFUSED(isocoat_body_set_desc(world, b.body, &desc), range, "stiffness is 10; must be > 0 and at most 3 isovalue");
