@@ -78,7 +78,7 @@ static void bodies(void)
     BODY(stiffness_scale, INFINITY, range, "stiffness_scale is inf");
     BODY(friction, -0.5, range, "friction is -0.5; must be from 0 to 1e6");
     BODY(friction, 1e300, range, "friction is 1e300; must be from 0 to 1e6");
-    BODY(viscous_friction, 1e12, range, "viscous_friction is 1e12; must be from 0 to 1e6");
+    BODY(viscous_friction, 1e20, range, "viscous_friction is 1e20; must be from 0 to 1e6");
     BODY(dissipation, 1e155, range, "dissipation is 1e155; must be from 0 to 1e6");
     BODY(friction, NAN, range, "friction is NaN");
     BODY(viscous_friction, -1.0, range, "viscous_friction is -1");
