@@ -6,7 +6,7 @@ use common::{Coat, Random, box_inertia, collide, total};
 use isocoat::base::Kind;
 use isocoat::field::Shape;
 use isocoat::math::{Mat3, Pose, Quat, Twist, Vec3};
-use isocoat::world::{EventKind, LinkDesc, LinkId, LinkState, Response, Scheme, World, WorldDesc};
+use isocoat::world::{BodyDesc, EventKind, LinkDesc, LinkId, LinkState, Response, Scheme, World, WorldDesc};
 
 const THICKNESS: f64 = 0.05;
 
@@ -95,6 +95,85 @@ fn boxes_that_meet_past_their_cores_neither_pass_each_other_nor_gain_energy() {
             assert!(state.pose.position.z > 0.2, "passed through");
             assert!(most <= 1.01 * before, "gained energy");
         }
+    }
+}
+
+#[test]
+fn boxes_one_in_another_come_apart_whatever_rubs_between_them() {
+    // A thin coat and a thick one, of the same outer size, from where neither knows the way out, and from aside.
+    for (half, thickness) in [(0.17, 0.03), (0.1, 0.1)] {
+        for (friction, static_friction, dissipation) in [(0.6, 0.0, 1.0), (0.6, 0.0, 0.0), (2.0, 3.0, 100.0)] {
+            for aside in [0.0, 1e-9, 1e-3, 0.05] {
+                for response in [Response::Auto, Response::Substepped, Response::Implicit] {
+                    let mut world =
+                        World::new(WorldDesc { response, gravity: Vec3::zeros(), ..WorldDesc::default() }).unwrap();
+                    let coat = Coat::cuboid(Vec3::repeat(half), thickness);
+                    let material = BodyDesc { friction, static_friction, dissipation, ..coat.body_desc() };
+                    let links = [0.0, aside].map(|x| {
+                        let inertia = box_inertia(2.0, Vec3::repeat(0.2));
+                        let pose = Pose::at(x, 0.0, 0.0);
+                        let desc = LinkDesc { kind: Kind::Rigid, mass: 2.0, inertia, pose, ..LinkDesc::default() };
+                        coat.add(&mut world, material.clone(), desc).1
+                    });
+                    let apart = |world: &World| {
+                        let [a, b] = links.map(|link| world.link_state(link).unwrap().pose.position);
+                        (b - a).norm()
+                    };
+                    // The push-out takes them past each other's middle at two thicknesses a second.
+                    let steps = (60.0 * (0.4 / (2.0 * thickness))) as usize;
+                    for _ in 0..steps {
+                        world.step(1.0 / 60.0).unwrap();
+                    }
+                    let distance = apart(&world);
+                    let what = format!("{thickness} {friction} {dissipation} {aside:e} {response:?}: {distance:.3} m");
+                    assert!(distance > 0.3, "{what}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_load_past_what_it_carries_is_held_up_by_a_soft_plane_and_says_so() {
+    for rotation in [Quat::identity(), isocoat::math::rotation_from_vector(&Vec3::new(0.43, 0.65, 0.22))] {
+        let gravity = Vec3::z() * -9.81;
+        let mut world =
+            World::new(WorldDesc { gravity, response: Response::Implicit, ..WorldDesc::default() }).unwrap();
+        Coat::floor(0.1).add_fixed(&mut world, Pose::default());
+        let (half, thickness, mass) = (0.1, 0.03, 1e4);
+        let coat = Coat::cuboid(Vec3::repeat(half), thickness);
+        let desc = LinkDesc {
+            kind: Kind::Rigid,
+            mass,
+            inertia: box_inertia(mass, Vec3::repeat(half + thickness)),
+            pose: Pose { position: Vec3::new(0.0, 0.0, 0.35), rotation },
+            ..LinkDesc::default()
+        };
+        let (_, link) = coat.add(&mut world, coat.body_desc(), desc);
+        let (mut touching, mut lowest, mut overloaded) = (false, f64::INFINITY, 0);
+        for _ in 0..600 {
+            world.step(1.0 / 60.0).unwrap();
+            for event in world.events() {
+                match event.kind {
+                    EventKind::Begin => touching = true,
+                    EventKind::End => touching = false,
+                    EventKind::Overload => {}
+                }
+            }
+            assert_eq!(touching, !world.contacts().is_empty(), "a contact is listed as long as bodies touch");
+            overloaded += usize::from(world.contacts().iter().any(|contact| contact.overloaded));
+            let force: Vec3 = world.contacts().iter().map(|contact| contact.force).sum();
+            let wrench = world.link_wrench(link).unwrap().force;
+            // The last part of a split step says the force then, not the mean.
+            if world.counters().implicit_splits == 0 && world.contacts().iter().any(|contact| contact.overloaded) {
+                assert!((wrench - force).norm() <= 1e-6 * (1.0 + force.norm()), "{wrench:?} {force:?}");
+            }
+            lowest = lowest.min(world.link_state(link).unwrap().pose.position.z);
+        }
+        println!("lowest {lowest:.3} m, overloaded in {overloaded} of 600 steps");
+        assert!(overloaded > 100);
+        // Wholly below the plane's surface, and by what it falls in a step.
+        assert!(lowest > 0.1 - 3f64.sqrt() * (half + thickness) - 0.06, "it sank to {lowest}");
     }
 }
 

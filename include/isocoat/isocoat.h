@@ -1907,7 +1907,10 @@ typedef struct isocoat_contact {
     uint32_t evaluations;
     /** The scheme that integrated it. */
     isocoat_scheme scheme;
-    /** 1 if the load is past the most that this contact can carry, else 0. */
+    /**
+     * 1 if the load is past the most that this contact can carry, else 0. The push-out that parts the two then is a
+     * contact of its own, with an area, a peak_pressure and a stiffness of 0 and an error_estimate of 1.
+     */
     uint32_t overloaded;
     /** 0. */
     uint32_t reserved;

@@ -50,7 +50,8 @@ pub struct isocoat_contact {
     pub evaluations: u32,
     /// The scheme that integrated it.
     pub scheme: isocoat_scheme,
-    /// 1 if the load is past the most that this contact can carry, else 0.
+    /// 1 if the load is past the most that this contact can carry, else 0. The push-out that parts the two then is a
+    /// contact of its own, with an area, a peak_pressure and a stiffness of 0 and an error_estimate of 1.
     pub overloaded: u32,
     /// 0.
     pub reserved: u32,

@@ -7,6 +7,7 @@
 //! begins with a fresh surface, so that nothing but the poses decides; an implicit one with a surface that
 //! [stands](super::standing), if there is one.
 
+use super::deepest::Approach;
 use super::friction::Bristle;
 use super::pair::Pair;
 use super::patch::{Node, Patch, Sums};
@@ -45,7 +46,7 @@ pub struct Candidate {
     pub fresh: bool,
     /// The surface is the one of which [`Memory::standing`] tells.
     standing: bool,
-    /// What each of its patches came to.
+    /// What each of its patches came to, and behind them the push-out of each overload.
     pub loads: Vec<Sums>,
     /// What lasts from step to step.
     pub memory: Memory,
@@ -151,6 +152,12 @@ impl Candidate {
     /// The patches that press, with what they came to.
     pub fn pressing(&self) -> impl Iterator<Item = (&Patch, &Sums)> {
         self.surface.patches.iter().zip(&self.loads).filter(|(_, load)| load.force != Vec3::zeros())
+    }
+
+    /// The overloads, with what pushed them apart.
+    pub fn push_outs(&self) -> impl Iterator<Item = (&(usize, usize, Approach), &Sums)> {
+        let first = self.surface.patches.len();
+        self.surface.overloads.iter().zip(self.loads.iter().skip(first))
     }
 
     /// Elastic energy in the compression of the present surface, at most: that of a force which grows in proportion to

@@ -9,6 +9,7 @@ use super::closed_form::{Round, contact};
 use super::deepest::Approach;
 use super::pair::{Pair, Side};
 use crate::field::Shape;
+use crate::field::separation::interval;
 
 /// A skeleton as a round coat, and how much flesh it has in all, its solid core included.
 fn round(side: &Side, skeleton: usize) -> (Round, f64) {
@@ -24,6 +25,14 @@ fn round(side: &Side, skeleton: usize) -> (Round, f64) {
     (round, placed.profile.thickness + core)
 }
 
+/// Whether a skeleton's coat lies wholly below the surface of another, a half-space.
+fn swallowed(side: &Side, skeleton: usize, ground: &Side, plane: usize) -> bool {
+    let (placed, ground) = (&side.skeletons[skeleton], &ground.skeletons[plane]);
+    let Shape::Plane { point, normal } = &ground.shape else { return false };
+    let (_, top) = interval(&placed.shape, normal);
+    top - point.dot(normal) + placed.profile.thickness <= ground.profile.thickness
+}
+
 /// Whether skeletons `i` of a and `j` of b are pressed together past the most that they can carry.
 pub fn is_overloaded(pair: &Pair, i: usize, j: usize, approach: &Approach) -> bool {
     let ((a, flesh_a), (b, flesh_b)) = (round(&pair.a, i), round(&pair.b, j));
@@ -37,6 +46,10 @@ pub fn is_overloaded(pair: &Pair, i: usize, j: usize, approach: &Approach) -> bo
         (&pair.a.skeletons[i].shape, &pair.b.skeletons[j].shape)
         && -approach.distance >= a.min().min(b.min())
     {
+        return true;
+    }
+    // Wholly under the surface of a half-space, as much presses down on it as up.
+    if swallowed(&pair.a, i, &pair.b, j) || swallowed(&pair.b, j, &pair.a, i) {
         return true;
     }
     // All the flesh of one is pressed together.

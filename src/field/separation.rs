@@ -62,7 +62,7 @@ fn normals(shape: &Shape) -> Directions {
 }
 
 /// The lowest and the highest of a bounded shape along a direction.
-fn interval(shape: &Shape, direction: &Vec3) -> (f64, f64) {
+pub fn interval(shape: &Shape, direction: &Vec3) -> (f64, f64) {
     let among = |points: &[Vec3]| {
         points
             .iter()

@@ -3,7 +3,7 @@
 //! Cores tell each other slowly what they wrote. So the groups of some candidates, or some springs, stay in the memory
 //! where they were put together, and all that is asked of them is asked bundle by bundle.
 
-use super::group::{Group, Member, Points, Push, Slope, relative};
+use super::group::{Group, Member, Points, Push, Slope, Source, relative};
 use super::sharing::Sharing;
 use super::springs::Tie;
 use crate::contact::patch::Sums;
@@ -129,7 +129,7 @@ impl Bundle {
 
     /// Leaves the patches, but not the walls, a part of their stiffness.
     pub fn soften(&mut self, part: f64) {
-        for group in self.groups.iter().filter(|group| group.patch.is_some()) {
+        for group in self.groups.iter().filter(|group| matches!(group.source, Source::Patch(_))) {
             self.points.soften(group.points.0..group.points.1, part);
         }
     }

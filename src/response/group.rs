@@ -219,13 +219,24 @@ pub struct Grip {
     pub radius: f64,
 }
 
+/// What a group is of, in its candidate's surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// One of the patches, or the part of it that some links carry.
+    Patch(u32),
+    /// The push-out of one of the overloads.
+    Overload(u32),
+    /// A gap that may close, or a wall of the last resort.
+    Gap,
+}
+
 /// Points that the same links carry, in the same parts.
 #[derive(Clone, Copy, Debug)]
 pub struct Group {
     /// Which candidate it belongs to.
     pub candidate: u32,
-    /// Which of its patches; none for a gap that may close.
-    pub patch: Option<u32>,
+    /// What of it.
+    pub source: Source,
     /// Centre of the group, in the pair's frame.
     pub center: Vec3,
     /// First and last-plus-one of its points.

@@ -2,7 +2,7 @@
 //! [implicit step](super::implicit), as points that press and rub on the links that carry them.
 
 use super::bundle::Bundle;
-use super::group::{Grip, Group, Member, Point, relative};
+use super::group::{Grip, Group, Member, Point, Source, relative};
 use crate::base::{Inertia, Motion};
 use crate::contact::candidate::Candidate;
 use crate::contact::deepest::{self, Approach};
@@ -51,23 +51,26 @@ pub struct Grouping<'a> {
 impl Grouping<'_> {
     /// Adds the groups of the candidate's contact surface, and of what is not in touch yet.
     pub fn add_all(&mut self) {
-        let Candidate { pair, surface, .. } = self.candidate;
+        let Candidate { pair, surface, material, .. } = self.candidate;
         let h = self.h;
         for (number, patch) in surface.patches.iter().enumerate() {
             let nodes = &surface.nodes[patch.nodes.0..patch.nodes.1];
             let sums = patch::sum(nodes);
             if sums.force != Vec3::zeros() {
-                let grip = self.grip(patch, &sums, nodes);
-                self.add_patch(number, nodes, &sums, &grip);
+                // Parts that must come apart are held by nothing: the flanks of one deep in another could lock them.
+                let material = if patch.overloaded { Material::default() } else { *material };
+                let grip = self.grip(patch, &material, &sums, nodes);
+                self.add_patch(number, nodes, &sums, &material, &grip);
             }
         }
         // What must come apart, from where the step began.
-        for (i, j, approach) in &surface.overloads {
+        for (number, (i, j, approach)) in surface.overloads.iter().enumerate() {
             let corners = corners(pair, *i, *j, approach).filter(|corner| is_overloaded(pair, *i, *j, corner));
             for approach in std::iter::once(*approach).chain(corners) {
                 self.bundle.carriers.find(pair, &approach.meeting);
                 let come = self.closing(&approach) * h;
-                self.add_wall([*i, *j], &approach, -PUSH_OUT * thinner(pair, *i, *j) * h - come);
+                let room = -PUSH_OUT * thinner(pair, *i, *j) * h - come;
+                self.add_wall(Source::Overload(number as u32), [*i, *j], &approach, room);
             }
         }
         if !surface.overloads.is_empty() {
@@ -85,7 +88,8 @@ impl Grouping<'_> {
                 // Nothing comes deeper than a coat bears, whatever its speed.
                 let near = corners(pair, i, j, &approach).filter(|corner| gap_of(corner) <= reach);
                 for wall in std::iter::once(approach).chain(near) {
-                    self.add_wall([i, j], &wall, (gap_of(&wall) + 0.5 * thinner(pair, i, j)).max(0.0));
+                    let room = (gap_of(&wall) + 0.5 * thinner(pair, i, j)).max(0.0);
+                    self.add_wall(Source::Gap, [i, j], &wall, room);
                 }
             } else if surface.patches.is_empty() && gap <= reach {
                 // A gap that may close, so that the next round starts from a shallow touch; one without depth has no
@@ -96,9 +100,9 @@ impl Grouping<'_> {
     }
 
     /// Adds the groups of a patch.
-    fn add_patch(&mut self, number: usize, nodes: &[Node], sums: &Sums, grip: &Grip) {
+    fn add_patch(&mut self, number: usize, nodes: &[Node], sums: &Sums, material: &Material, grip: &Grip) {
         let Self { bundle, motions, trial, candidate, index, h, .. } = self;
-        let Candidate { pair, material, .. } = candidate;
+        let pair = &candidate.pair;
         let Bundle { groups, points, members, sharing, .. } = &mut **bundle;
         sharing.find(pair, nodes);
         sharing.each_kind(nodes, |nodes, shares| {
@@ -113,7 +117,7 @@ impl Grouping<'_> {
                 (!candidate.fresh).then(|| relative(own, |link| candidate.velocity_looked_at(link, motions, *h)));
             groups.push(Group {
                 candidate: *index,
-                patch: Some(number as u32),
+                source: Source::Patch(number as u32),
                 center,
                 points: (first_point, points.count()),
                 members: (first_member, members.len()),
@@ -126,8 +130,8 @@ impl Grouping<'_> {
     }
 
     /// Dry friction of a patch.
-    fn grip(&self, patch: &Patch, sums: &Sums, nodes: &[Node]) -> Grip {
-        let Candidate { pair, material, memory, .. } = self.candidate;
+    fn grip(&self, patch: &Patch, material: &Material, sums: &Sums, nodes: &[Node]) -> Grip {
+        let Candidate { pair, memory, .. } = self.candidate;
         if material.friction <= 0.0 && material.static_friction <= 0.0 {
             return Grip::default();
         }
@@ -157,18 +161,18 @@ impl Grouping<'_> {
     fn add_gap(&mut self, [i, j]: [usize; 2], approach: &Approach, gap: f64) {
         let pair = &self.candidate.pair;
         let stiffness = reachable(pair, i, j, 0.1 * thinner(pair, i, j)).stiffness;
-        self.add_lone(approach, -stiffness * gap, stiffness);
+        self.add_lone(Source::Gap, approach, -stiffness * gap, stiffness);
     }
 
     /// A wall beyond which two skeletons come no closer than `room` metres from where they are; negative room parts them.
-    fn add_wall(&mut self, [i, j]: [usize; 2], approach: &Approach, room: f64) {
+    fn add_wall(&mut self, source: Source, [i, j]: [usize; 2], approach: &Approach, room: f64) {
         let pair = &self.candidate.pair;
         self.bundle.carriers.find(pair, &approach.meeting);
         let mobility = self.bundle.carriers.mobility(self.trial, &pair.origin, &approach.meeting);
         let along = approach.direction.dot(&(mobility * approach.direction));
         if along > 0.0 {
             let stiffness = (WALL / (along * self.h * self.h)).max(reachable(pair, i, j, f64::INFINITY).stiffness);
-            self.add_lone(approach, -stiffness * room, stiffness);
+            self.add_lone(source, approach, -stiffness * room, stiffness);
         }
     }
 
@@ -178,7 +182,7 @@ impl Grouping<'_> {
         -self.bundle.carriers.slip(self.trial, origin, &approach.meeting).dot(&approach.direction)
     }
 
-    fn add_lone(&mut self, approach: &Approach, load: f64, stiffness: f64) {
+    fn add_lone(&mut self, source: Source, approach: &Approach, load: f64, stiffness: f64) {
         let Bundle { groups, points, members, carriers, .. } = &mut *self.bundle;
         let (pair, center) = (&self.candidate.pair, approach.meeting);
         let (first_point, first_member) = (points.count(), members.len());
@@ -187,7 +191,7 @@ impl Grouping<'_> {
         members.extend(carriers.both().map(|share| member(self.trial, pair, &center, share)));
         groups.push(Group {
             candidate: self.index,
-            patch: None,
+            source,
             center,
             points: (first_point, points.count()),
             members: (first_member, members.len()),

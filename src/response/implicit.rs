@@ -9,7 +9,7 @@
 use super::bundle::{Bundle, Part};
 use super::coupled::{Coupled, Problem, put_twist, twist_of};
 use super::envelope::{BLOCK, OrderBuffers, narrow_order};
-use super::group::{Group, Member};
+use super::group::{Group, Member, Source};
 use super::grouping::{CREEP, Grouping, RECOVERY, combinations, thicknesses, thinner};
 use super::springs::{self, Tie};
 use super::substep::{Island, Step, bend_bristles, drift};
@@ -20,6 +20,7 @@ use crate::contact::deepest;
 use crate::contact::pair::Pair;
 use crate::contact::patch::Sums;
 use crate::contact::press::Carriers;
+use crate::contact::surface::Surface;
 use crate::math::{Twist, Vec3, Wrench};
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -450,7 +451,7 @@ impl Solver {
         let change = Twist { linear: now.linear - group.base.linear, angular: now.angular - group.base.angular };
         let pair = &candidates[group.candidate as usize];
         let speed = speed(members, motions, h);
-        let Some(patch) = group.patch else {
+        let Source::Patch(patch) = group.source else {
             // A wall or a gap is exact, until it begins to push where it did not.
             let point = bundle.points.get(group.points.0);
             let closed = point.load - h * point.stiffness * point.normal.dot(&change.linear);
@@ -545,21 +546,26 @@ impl Solver {
 fn hand_out(bundle: &Bundle, first: usize, candidates: &mut [Kept]) {
     for candidate in candidates.iter_mut() {
         candidate.loads.clear();
-        candidate.loads.resize(candidate.surface.patches.len(), Sums::default());
+        let Surface { patches, overloads, .. } = &candidate.surface;
+        candidate.loads.resize(patches.len() + overloads.len(), Sums::default());
         if !candidate.surface.overloads.is_empty() {
             (candidate.memory.overloaded, candidate.memory.touched) = (true, true);
         }
     }
-    let same = |a: &Group, b: &Group| (a.candidate, a.patch) == (b.candidate, b.patch);
+    let same = |a: &Group, b: &Group| (a.candidate, a.source) == (b.candidate, b.source);
     let mut begin = 0;
     for groups in bundle.groups.chunk_by(same) {
         let range = begin..begin + groups.len();
         begin = range.end;
-        let Some(patch) = groups[0].patch else { continue };
         let candidate = &mut candidates[groups[0].candidate as usize - first];
+        let place = match groups[0].source {
+            Source::Patch(patch) => patch as usize,
+            Source::Overload(overload) => candidate.surface.patches.len() + overload as usize,
+            Source::Gap => continue,
+        };
         let sums = bundle.sums_of(range);
         candidate.memory.touched |= sums.force != Vec3::zeros();
-        candidate.loads[patch as usize] = sums;
+        candidate.loads[place] = sums;
     }
 }
 

@@ -133,7 +133,7 @@ pub(super) fn bend_bristles(candidate: &mut Candidate, motions: &[Motion], h: f6
     for bristle in &mut memory.bristles {
         bristle.seen = false;
     }
-    for patch in &surface.patches {
+    for patch in surface.patches.iter().filter(|patch| !patch.overloaded) {
         let sums = patch::sum(&nodes[patch.nodes.0..patch.nodes.1]);
         let size = sums.force.norm();
         if size > 0.0 {

@@ -5,6 +5,8 @@ use super::step::Stepping;
 use super::{BodyId, World};
 use crate::contact::candidate::Candidate;
 use crate::contact::pair::Side;
+use crate::contact::patch::Sums;
+use crate::math::Vec3;
 use crate::team::Team;
 
 /// What is to be said of a candidate at the end of a step.
@@ -20,7 +22,7 @@ impl Conclusion {
     /// What happened, noted in the candidate's memory too.
     fn of(candidate: &mut Candidate, implicit: bool) -> Self {
         let overloaded = !candidate.surface.overloads.is_empty();
-        let contacts = candidate.pressing().count();
+        let contacts = candidate.pressing().count() + candidate.push_outs().count();
         let touching = contacts > 0 || overloaded;
         let held = if implicit { 0.0 } else { candidate.elastic_energy() };
         let memory = &mut candidate.memory;
@@ -88,26 +90,40 @@ impl World {
     /// The contacts of a candidate as they were last evaluated.
     pub(super) fn contacts_of<'a>(&'a self, candidate: &'a Candidate) -> impl Iterator<Item = Contact> + 'a {
         let pair = &candidate.pair;
-        candidate.pressing().map(move |(patch, sums)| {
+        let of = move |[i, j]: [usize; 2], sums: &Sums| {
             let link = |side: &Side, index: usize| self.links.id_of(side.links[index] as usize);
             let skeleton = |side: &Side, index: usize| self.skeletons.id_of(side.ids[index] as usize);
-            let [i, j] = patch.skeletons;
             Contact {
                 bodies: candidate.bodies.map(|body| self.bodies.id_of(body as usize)),
                 links: [link(&pair.a, i), link(&pair.b, j)],
                 skeletons: [skeleton(&pair.a, i), skeleton(&pair.b, j)],
                 position: pair.origin + sums.center,
-                normal: sums.force.normalize(),
                 force: sums.force,
                 torque: sums.torque,
-                area: sums.area,
-                peak_pressure: patch.peak_pressure,
-                stiffness: sums.stiffness,
-                error_estimate: patch.error_estimate,
-                evaluations: patch.evaluations,
-                scheme: patch.scheme,
-                overloaded: patch.overloaded,
+                ..Contact::default()
             }
-        })
+        };
+        let pressing = candidate.pressing().map(move |(patch, sums)| Contact {
+            normal: sums.force.normalize(),
+            area: sums.area,
+            peak_pressure: patch.peak_pressure,
+            stiffness: sums.stiffness,
+            error_estimate: patch.error_estimate,
+            evaluations: patch.evaluations,
+            scheme: patch.scheme,
+            overloaded: patch.overloaded,
+            ..of(patch.skeletons, sums)
+        });
+        let pushed_out = candidate.push_outs().map(move |((i, j, approach), sums)| {
+            let pushes = sums.force != Vec3::zeros();
+            Contact {
+                position: pair.origin + if pushes { sums.center } else { approach.meeting },
+                normal: if pushes { sums.force.normalize() } else { approach.direction },
+                error_estimate: 1.0,
+                overloaded: true,
+                ..of([*i, *j], sums)
+            }
+        });
+        pressing.chain(pushed_out)
     }
 }

@@ -13,6 +13,7 @@ use crate::base::{Kind, Motion};
 use crate::clock::Clock;
 use crate::contact::broad_phase::{Bounds, BroadPhase};
 use crate::contact::candidate::{Candidate, Kept, Memory};
+use crate::contact::patch::Sums;
 use crate::contact::surface;
 use crate::error::{Result, require};
 use crate::math::Wrench;
@@ -325,6 +326,7 @@ impl World {
             surface::integrate(&candidate.pair, &settings, &mut candidate.surface);
             candidate.loads.clear();
             candidate.loads.extend(candidate.surface.sums());
+            candidate.loads.extend(candidate.surface.overloads.iter().map(|_| Sums::default()));
             contacts.extend(self.contacts_of(candidate));
         };
         if a == b {
