@@ -506,7 +506,7 @@ mod tests {
         let center = points.extend(nodes.iter());
         let group = Group {
             candidate: 0,
-            patch: Some(0),
+            source: Source::Patch(0),
             center,
             points: (0, count),
             members: (0, 0),
