@@ -115,16 +115,13 @@ fn boxes_one_in_another_come_apart_whatever_rubs_between_them() {
                         let desc = LinkDesc { kind: Kind::Rigid, mass: 2.0, inertia, pose, ..LinkDesc::default() };
                         coat.add(&mut world, material.clone(), desc).1
                     });
-                    let apart = |world: &World| {
-                        let [a, b] = links.map(|link| world.link_state(link).unwrap().pose.position);
-                        (b - a).norm()
-                    };
                     // The push-out takes them past each other's middle at two thicknesses a second.
                     let steps = (60.0 * (0.4 / (2.0 * thickness))) as usize;
                     for _ in 0..steps {
                         world.step(1.0 / 60.0).unwrap();
                     }
-                    let distance = apart(&world);
+                    let [a, b] = links.map(|link| world.link_state(link).unwrap().pose.position);
+                    let distance = (b - a).norm();
                     let what = format!("{thickness} {friction} {dissipation} {aside:e} {response:?}: {distance:.3} m");
                     assert!(distance > 0.3, "{what}");
                 }

@@ -1849,7 +1849,7 @@ typedef struct isocoat_counters {
     uint32_t islands;
     /** Sub-steps of the group that took the most, of those that were not solved implicitly. */
     uint32_t substeps;
-    /** Pieces of contact surface at the end of the step. */
+    /** Pieces of contact surface at the end of the step, and push-outs: as many as there are contacts. */
     uint32_t patches;
     /** Evaluations of a pair of fields. Contacts at rest need none: their surfaces stand from the last step. */
     uint64_t evaluations;

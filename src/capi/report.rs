@@ -170,7 +170,7 @@ pub struct isocoat_counters {
     pub islands: u32,
     /// Sub-steps of the group that took the most, of those that were not solved implicitly.
     pub substeps: u32,
-    /// Pieces of contact surface at the end of the step.
+    /// Pieces of contact surface at the end of the step, and push-outs: as many as there are contacts.
     pub patches: u32,
     /// Evaluations of a pair of fields. Contacts at rest need none: their surfaces stand from the last step.
     pub evaluations: u64,

@@ -79,7 +79,7 @@ pub struct Counters {
     pub implicit_rounds: u32,
     /// Splits of the implicitly solved island that took the most.
     pub implicit_splits: u32,
-    /// Patches at the end of the step.
+    /// Patches at the end of the step, and push-outs: as many as there are contacts.
     pub patches: u32,
     /// Evaluations of a pair of fields, by all schemes. Contacts at rest need none: their surfaces stand from the last
     /// step.
