@@ -139,7 +139,7 @@ impl Side {
 
     /// A bound from above of `f - c` over the parallelepiped about `center` with these half sides: the distance to a
     /// convex core stays above its tangents, and fields fall with it.
-    fn most(&self, center: &Vec3, legs: &[Vec3; 3]) -> f64 {
+    pub fn most(&self, center: &Vec3, legs: &[Vec3; 3]) -> f64 {
         const PLACES: [(f64, f64); 5] = [(0.0, 0.0), (1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)];
         let highest = |skeleton: &Placed| {
             let mut least = f64::NEG_INFINITY;

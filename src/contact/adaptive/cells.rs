@@ -1,64 +1,84 @@
-//! Border-adaptive subdivision: for patches that are not star-shaped, have several deepest points, or corners.
+//! Cells: squares of a sheet that look at the surface over it, and are split where most is in doubt.
 //!
-//! Square cells of the plane spread from the deepest point as far as there is contact; each looks at the surface at its
-//! corners, its edges' middles and its centre, which neighbours and halves share. The distance to a convex core is
-//! convex, so a cell that is in contact at all nine is in contact wherever else, and takes Simpson's rule, of fourth
-//! order. Where a cell is cut by the border, the pressure between its nine places is the mean of two readings, the
-//! values joined up and the tangents blended, which err by the same amount to opposite sides when the pressure is
-//! quadratic. How far they are apart is the estimate there: beside a flat face, which ends within a small part of a
-//! cell, they differ by all that may be missed. Cells are split where most is in doubt, until what is left meets the
-//! tolerance.
+//! Each looks at the surface at its corners, its edges' middles and its centre, which neighbours and halves share. The
+//! distance to a convex core is convex, so a cell that is in contact at all nine is in contact wherever else, and takes
+//! Simpson's rule, of fourth order. Where a cell is cut by the border, the pressure between its nine places is the mean
+//! of two readings, the values joined up and the tangents blended, which err by the same amount to opposite sides when
+//! the pressure is quadratic. How far they are apart is the estimate there: beside a flat face, which ends within a
+//! small part of a cell, they differ by all that may be missed. Cells are split where most is in doubt, until what is
+//! left meets the tolerance.
 
 use std::collections::HashMap;
 
-use super::column::{Frame, Solver};
-use super::deepest::Deepest;
-use super::pair::Pair;
-use super::patch::Node;
+use crate::contact::pair::Pair;
+use crate::contact::patch::Node;
 use crate::math::Vec3;
 
-/// Side of a cell of the first grid, in units of the patch's predicted radius.
-const GRID: f64 = 0.5;
+/// Side of a cell of the first grid, in units of its sheet.
+pub const GRID: f64 = 0.5;
 /// Most cells of one patch, split ones included, at the finest tolerance, and at the coarsest; in between, this over
 /// the tolerance. What cannot be resolved, such as a patch that is bent round an edge, must not hold up a step.
 const MOST_CELLS: f64 = 30_000.0;
 const FEWEST_CELLS: f64 = 1_000.0;
-const CELLS: f64 = 50.0;
+const CELLS: f64 = 10.0;
 /// Most cells of the first grid: more are finer than it takes to begin with.
-const MOST_FIRST_CELLS: usize = 256;
+pub const MOST_FIRST_CELLS: usize = 256;
 /// Most halvings of a cell.
 const DEEPEST_LEVEL: u32 = 14;
 /// Half a side of a cell of the first grid, on the lattice that all places lie on.
-const FIRST_HALF: i32 = 1 << DEEPEST_LEVEL;
+pub const FIRST_HALF: i32 = 1 << DEEPEST_LEVEL;
 /// Parts that a quarter of a cell is read in across each side.
 const PARTS: i32 = 4;
 
-/// A place of the plane where the surface was looked for.
+/// A place on a part of a sheet.
 #[derive(Clone, Copy, Debug)]
-struct Vertex {
-    x: f64,
-    y: f64,
-    /// Height of the surface, and its slopes.
-    height: f64,
-    slopes: [f64; 2],
-    /// `σ` there, and its slopes along the surface.
-    sum: f64,
-    gradient: [f64; 2],
-    /// Vector area, and stiffness, of a unit of the plane.
-    area: Vec3,
-    stiffness: f64,
-    /// What Simpson's rule gives it in all cells together.
-    weight: f64,
+pub struct Place {
+    pub part: u8,
+    pub x: f64,
+    pub y: f64,
 }
 
-/// A square of the plane.
+/// The surface over a place.
 #[derive(Clone, Copy, Debug)]
-struct Cell {
+pub struct Vertex {
+    pub place: Place,
+    /// Height of the surface, and its slopes.
+    pub height: f64,
+    pub slopes: [f64; 2],
+    /// `σ` there, and its slopes along the surface.
+    pub sum: f64,
+    pub gradient: [f64; 2],
+    /// Vector area, and stiffness, of a unit of the sheet.
+    pub area: Vec3,
+    pub stiffness: f64,
+}
+
+/// What the surface is a height over: a plane, or parts that together go round something.
+pub trait Sheet {
+    /// The two coats.
+    fn pair(&self) -> &Pair;
+    /// The point at a height over a place.
+    fn point(&self, place: Place, height: f64) -> Vec3;
+    /// Area of a unit of the sheet, lifted to a height, and its normal there.
+    fn flat(&self, place: Place, height: f64) -> (f64, Vec3);
+    /// The surface over a place, from a guess of its height, or a second one.
+    fn look(&mut self, place: Place, guess: f64, second: f64) -> Option<Vertex>;
+    /// A bound of `σ` from above over a square between four vertices without contact.
+    fn most(&self, corners: &[Vertex; 4], side: f64) -> f64;
+    /// The surface turned out not to be a height over the sheet.
+    fn is_lost(&self) -> bool;
+}
+
+/// A square of a sheet.
+#[derive(Clone, Copy, Debug)]
+pub struct Cell {
+    /// The part of the sheet.
+    part: u8,
     /// Its centre and half its side on the lattice.
     center: (i32, i32),
     half: i32,
     /// The nine places, row by row; `None` where no surface was found.
-    vertices: [Option<u32>; 9],
+    pub vertices: [Option<u32>; 9],
     /// In contact all over.
     inside: bool,
     force: Vec3,
@@ -73,90 +93,12 @@ struct Cell {
 /// What is left of an integration, and its memory.
 #[derive(Debug, Default)]
 pub struct Workspace {
-    vertices: Vec<Vertex>,
-    places: HashMap<(i32, i32), Option<u32>>,
-    cells: Vec<Cell>,
+    pub vertices: Vec<Vertex>,
+    /// What Simpson's rule gives each in all cells together.
+    weights: Vec<f64>,
+    places: HashMap<(u8, i32, i32), Option<u32>>,
+    pub cells: Vec<Cell>,
     pool: Vec<Node>,
-    visited: HashMap<(i32, i32), bool>,
-    queue: Vec<(i32, i32, f64)>,
-}
-
-/// An integrated patch.
-pub struct Integrated {
-    /// Estimated relative error of its force.
-    pub error: f64,
-    /// Evaluations it took.
-    pub evaluations: u32,
-    /// Its frame.
-    pub frame: Frame,
-}
-
-/// Sum of two unit normals below which they are opposite: no plane is between.
-const OPPOSITE: f64 = 0.1;
-
-/// How often the plane is turned towards a part of the surface that leans over.
-const MOST_TURNS: u32 = 2;
-
-/// The surface leans over somewhere: it is no height over one plane.
-pub struct LeansOver {
-    /// Evaluations it took to find out.
-    pub evaluations: u32,
-}
-
-/// The cell of the first grid that holds a point of the plane.
-pub fn grid_cell(x: f64, y: f64) -> (i32, i32) {
-    ((x / GRID).round() as i32, (y / GRID).round() as i32)
-}
-
-/// Integrates the connected patch that holds a deepest point, appending to `nodes`, and to `cells` those
-/// of the first grid that hold contact, in order.
-pub fn integrate(
-    pair: &Pair,
-    at: &Deepest,
-    extent: f64,
-    tolerance: f64,
-    workspace: &mut Workspace,
-    nodes: &mut Vec<Node>,
-    cells: &mut Vec<(i32, i32)>,
-) -> Result<Integrated, LeansOver> {
-    let mut solver = Solver { pair, frame: Frame::new(at, [1.0, 1.0]), accept: 0.0, border_step: 0.0, evaluations: 0 };
-    solver.aim(at.sum, tolerance);
-    // Solved out, so that a symmetric contact comes out symmetric: no guess from a neighbour shows.
-    solver.accept *= 1e-2;
-    if solver.fit(at, extent).is_none() {
-        // No clear border along an axis: the prediction will do, the cells spread by themselves.
-        let scale = solver.frame.scale.map(|s| s.min(extent));
-        solver.frame = Frame::new(at, scale);
-    }
-    let mut turns = 0;
-    let error = loop {
-        let mut work = Work { solver, workspace, leans: None };
-        // A tilted face is deepest at its rounded edge, which says nothing of its size.
-        while !work.spread(at) {
-            work.solver.frame.scale = work.solver.frame.scale.map(|scale| 4.0 * scale);
-        }
-        let error = work.refine(tolerance);
-        let leans = work.leans;
-        solver = work.solver;
-        let Some(normal) = leans else { break error };
-        // Round an edge, a plane half way between sees both sides.
-        let between = solver.frame.normal + normal;
-        if turns == MOST_TURNS || between.norm() < OPPOSITE {
-            return Err(LeansOver { evaluations: solver.evaluations });
-        }
-        turns += 1;
-        solver.frame = solver.frame.facing(&between);
-    };
-    if workspace.cells.is_empty() {
-        // Nothing of it is seen along the plane's normal.
-        return Err(LeansOver { evaluations: solver.evaluations });
-    }
-    let (frame, evaluations) = (solver.frame, solver.evaluations);
-    workspace.collect(pair, &frame, nodes);
-    let first = cells.len();
-    cells.extend(workspace.visited.iter().filter(|(_, active)| **active).map(|(key, _)| *key));
-    cells[first..].sort_unstable();
-    Ok(Integrated { error, evaluations, frame })
 }
 
 /// Part of the difference between Simpson's rule and the trapezes' that counts as the former's error.
@@ -167,21 +109,40 @@ const SIMPSON: [f64; 3] = [1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0];
 const TRAPEZES: [f64; 3] = [0.25, 0.5, 0.25];
 
 impl Workspace {
+    /// Forgets all, with room for twice as many as the last time: what rests asks for no memory, though its counts
+    /// change a little.
+    pub fn clear(&mut self) {
+        let Self { vertices, weights, places, cells, pool } = self;
+        vertices.reserve(vertices.len());
+        weights.reserve(weights.len());
+        places.reserve(places.len());
+        cells.reserve(cells.len());
+        pool.reserve(pool.len());
+        vertices.clear();
+        weights.clear();
+        places.clear();
+        cells.clear();
+        pool.clear();
+    }
+
     /// Gives the nodes of all cells: the places inside, each once, and what lies at the border.
-    fn collect(&mut self, pair: &Pair, frame: &Frame, nodes: &mut Vec<Node>) {
+    pub fn collect(&mut self, sheet: &impl Sheet, nodes: &mut Vec<Node>) {
+        self.weights.resize(self.vertices.len(), 0.0);
         for cell in self.cells.iter().filter(|cell| cell.inside && !cell.split) {
             let area = (2.0 * length(cell.half)).powi(2);
             for (index, vertex) in cell.vertices.iter().enumerate() {
                 if let Some(vertex) = vertex {
-                    self.vertices[*vertex as usize].weight += SIMPSON[index % 3] * SIMPSON[index / 3] * area;
+                    self.weights[*vertex as usize] += SIMPSON[index % 3] * SIMPSON[index / 3] * area;
                 }
             }
         }
-        nodes.extend(self.vertices.iter().filter(|vertex| vertex.weight > 0.0).map(|vertex| Node {
-            position: frame.point(vertex.x, vertex.y, vertex.height),
-            force: vertex.area * (pair.scale * vertex.sum * vertex.weight),
-            area: vertex.area.norm() * vertex.weight,
-            stiffness: vertex.stiffness * vertex.weight,
+        let scale = sheet.pair().scale;
+        let weighted = self.vertices.iter().zip(&self.weights).filter(|(_, weight)| **weight > 0.0);
+        nodes.extend(weighted.map(|(vertex, weight)| Node {
+            position: sheet.point(vertex.place, vertex.height),
+            force: vertex.area * (scale * vertex.sum * weight),
+            area: vertex.area.norm() * weight,
+            stiffness: vertex.stiffness * weight,
         }));
         for cell in self.cells.iter().filter(|cell| !cell.split) {
             nodes.extend_from_slice(&self.pool[cell.nodes.0..cell.nodes.1]);
@@ -189,70 +150,20 @@ impl Workspace {
     }
 }
 
-/// A length on the lattice in units of the frame.
-fn length(steps: i32) -> f64 {
+/// A length on the lattice in units of the sheet.
+pub fn length(steps: i32) -> f64 {
     f64::from(steps) * (0.5 * GRID / f64::from(FIRST_HALF))
 }
 
-struct Work<'a, 'b> {
-    solver: Solver<'a>,
-    workspace: &'b mut Workspace,
-    /// The normal where the surface leans over.
-    leans: Option<Vec3>,
+/// The cells of a sheet at work.
+pub struct Cells<'a, S> {
+    pub sheet: S,
+    pub workspace: &'a mut Workspace,
 }
 
-impl Work<'_, '_> {
-    /// Covers the contact with cells of the first grid, from the deepest point outwards. False when they are too many.
-    fn spread(&mut self, at: &Deepest) -> bool {
-        let Workspace { vertices, places, cells, pool, visited, queue } = &mut *self.workspace;
-        // Room for twice as many as the last time: what rests asks for no memory, though its counts change a little.
-        vertices.reserve(vertices.len());
-        places.reserve(places.len());
-        cells.reserve(cells.len());
-        pool.reserve(pool.len());
-        visited.reserve(visited.len());
-        queue.reserve(queue.len());
-        vertices.clear();
-        places.clear();
-        cells.clear();
-        pool.clear();
-        visited.clear();
-        queue.clear();
-        let (x, y, height) = self.solver.frame.coordinates(&at.position);
-        let (i, j) = grid_cell(x, y);
-        self.workspace.queue.push((i, j, height));
-        self.workspace.visited.insert((i, j), false);
-        let mut next = 0;
-        while self.leans.is_none() && next < self.workspace.queue.len() {
-            if self.workspace.cells.len() >= MOST_FIRST_CELLS {
-                return false;
-            }
-            let (i, j, guess) = self.workspace.queue[next];
-            next += 1;
-            let Some(cell) = self.measure((2 * i * FIRST_HALF, 2 * j * FIRST_HALF), FIRST_HALF, guess) else {
-                continue;
-            };
-            self.workspace.visited.insert((i, j), true);
-            for (di, dj) in [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1)] {
-                let key = (i + di, j + dj);
-                if let std::collections::hash_map::Entry::Vacant(entry) = self.workspace.visited.entry(key) {
-                    entry.insert(false);
-                    // From the place of this cell that is next to the other's centre.
-                    let near = cell.vertices[((dj + 1) * 3 + di + 1) as usize];
-                    let guess = near.map_or(guess, |near| {
-                        let near = &self.workspace.vertices[near as usize];
-                        near.height + 0.5 * GRID * (near.slopes[0] * f64::from(di) + near.slopes[1] * f64::from(dj))
-                    });
-                    self.workspace.queue.push((key.0, key.1, guess));
-                }
-            }
-            self.workspace.cells.push(cell);
-        }
-        true
-    }
-
+impl<S: Sheet> Cells<'_, S> {
     /// Splits the cells that matter most until the estimate meets the tolerance; gives the estimate.
-    fn refine(&mut self, tolerance: f64) -> f64 {
+    pub fn refine(&mut self, tolerance: f64) -> f64 {
         let most = (CELLS / tolerance).clamp(FEWEST_CELLS, MOST_CELLS) as usize;
         loop {
             let (mut force, mut error, mut worst, mut live) = (Vec3::zeros(), 0.0, 0.0f64, 0usize);
@@ -266,7 +177,7 @@ impl Work<'_, '_> {
             }
             let size = force.norm();
             let relative = if size > 0.0 { error / size } else { 1.0 };
-            if self.leans.is_some() || relative <= tolerance || worst == 0.0 || self.workspace.cells.len() + 4 > most {
+            if self.sheet.is_lost() || relative <= tolerance || worst == 0.0 || self.workspace.cells.len() + 4 > most {
                 return relative.min(1.0) + 1e-14;
             }
             let limit = (0.2 * worst).max(0.25 * tolerance * size / live as f64).min(worst);
@@ -295,15 +206,17 @@ impl Work<'_, '_> {
                 let (dx, dy) = (length(away * sx * half), length(away * sy * half));
                 from.height + from.slopes[0] * dx + from.slopes[1] * dy
             });
-            if let Some(cell) = self.measure(center, half, guess) {
+            if let Some(cell) = self.measure(parent.part, center, half, guess) {
                 self.workspace.cells.push(cell);
             }
         }
         let children = &self.workspace.cells[first..];
-        if parent.inside && children.iter().all(|cell| cell.inside) {
+        if let (true, Some(middle)) = (parent.inside && children.iter().all(|cell| cell.inside), parent.vertices[4]) {
             // Where the fields are smooth a split makes Simpson's rule fifteen times better, across a kink hardly so.
             let change = parent.force - children.iter().map(|cell| cell.force).sum::<Vec3>();
-            let aside = self.sideways(&change) / 4.0;
+            let middle = &self.workspace.vertices[middle as usize];
+            let (_, normal) = self.sheet.flat(middle.place, middle.height);
+            let aside = across(&change, &normal) / 4.0;
             for cell in &mut self.workspace.cells[first..] {
                 cell.aside = cell.aside.min(aside);
             }
@@ -311,8 +224,8 @@ impl Work<'_, '_> {
     }
 
     /// Integrates one cell; `None` when it holds no contact.
-    fn measure(&mut self, center: (i32, i32), half: i32, guess: f64) -> Option<Cell> {
-        let middle = self.vertex(center, guess, guess);
+    pub fn measure(&mut self, part: u8, center: (i32, i32), half: i32, guess: f64) -> Option<Cell> {
+        let middle = self.vertex((part, center.0, center.1), guess, guess);
         let mut vertices = [middle; 9];
         for (index, vertex) in vertices.iter_mut().enumerate().filter(|(index, _)| *index != 4) {
             let (i, j) = ((index % 3) as i32 - 1, (index / 3) as i32 - 1);
@@ -321,10 +234,11 @@ impl Work<'_, '_> {
                 (middle.height, middle.slopes)
             });
             let along = height + slopes[0] * length(i * half) + slopes[1] * length(j * half);
-            *vertex = self.vertex((center.0 + i * half, center.1 + j * half), along, height);
+            *vertex = self.vertex((part, center.0 + i * half, center.1 + j * half), along, height);
         }
         let first = self.workspace.pool.len();
         let mut cell = Cell {
+            part,
             center,
             half,
             vertices,
@@ -335,7 +249,7 @@ impl Work<'_, '_> {
             nodes: (first, first),
             split: false,
         };
-        let scale = self.solver.pair.scale * (2.0 * length(half)).powi(2);
+        let scale = self.sheet.pair().scale * (2.0 * length(half)).powi(2);
         // Simpson's rule, and the trapezes' with their ends corrected, which is of fourth order too; of the sideways
         // part, whose slopes are not known, the trapezes' alone.
         let (mut simpson, mut corrected, mut rough) = (0.0, 0.0, Vec3::zeros());
@@ -355,10 +269,13 @@ impl Work<'_, '_> {
             corrected += vertex.sum * TRAPEZES[column] * TRAPEZES[row]
                 + (ends[0] * vertex.gradient[0] + ends[1] * vertex.gradient[1]) * length(half) / 24.0;
         }
-        cell.error = (simpson - corrected).abs() * scale * self.solver.frame.unit_area();
-        cell.aside = SIDEWAYS * self.sideways(&(cell.force - rough));
-        if !cell.inside {
-            (cell.force, cell.error, cell.aside) = (Vec3::zeros(), 0.0, 0.0);
+        if let (true, Some(middle)) = (cell.inside, middle) {
+            let middle = &self.workspace.vertices[middle as usize];
+            let (unit, normal) = self.sheet.flat(middle.place, middle.height);
+            cell.error = (simpson - corrected).abs() * scale * unit;
+            cell.aside = SIDEWAYS * across(&(cell.force - rough), &normal);
+        } else {
+            cell.force = Vec3::zeros();
             let mut touched = false;
             for corner in [0, 1, 3, 4] {
                 let quarter = [corner, corner + 1, corner + 3, corner + 4].map(|index| vertices[index]);
@@ -375,7 +292,7 @@ impl Work<'_, '_> {
     /// Adds what a quarter of a cell on the border carries. False when it holds no contact.
     fn quarter(&mut self, corners: [Option<u32>; 4], cell: &mut Cell) -> bool {
         let side = length(cell.half);
-        let scale = self.solver.pair.scale;
+        let scale = self.sheet.pair().scale;
         let mut found = [None; 4];
         for (vertex, index) in found.iter_mut().zip(corners) {
             *vertex = index.map(|index| self.workspace.vertices[index as usize]);
@@ -387,7 +304,7 @@ impl Work<'_, '_> {
             let weight = 0.5 * side * side;
             let force = vertex.area * (scale * vertex.sum * weight);
             self.workspace.pool.push(Node {
-                position: self.solver.frame.point(vertex.x, vertex.y, vertex.height),
+                position: self.sheet.point(vertex.place, vertex.height),
                 force,
                 area: vertex.area.norm() * weight,
                 stiffness: vertex.stiffness * weight,
@@ -397,7 +314,8 @@ impl Work<'_, '_> {
             return true;
         };
         let corners = [v00, v10, v01, v11];
-        let bound = if corners.iter().any(|vertex| vertex.sum > 0.0) { None } else { Some(self.most(&corners, side)) };
+        let bound =
+            if corners.iter().any(|vertex| vertex.sum > 0.0) { None } else { Some(self.sheet.most(&corners, side)) };
         if bound.is_some_and(|bound| bound <= 0.0) {
             return false;
         }
@@ -432,93 +350,31 @@ impl Work<'_, '_> {
         if load > 0.0 {
             cell.force += force;
             let [x, y, height] = moment.map(|sum| sum / load);
-            let position = self.solver.frame.point(v00.x + x * side, v00.y + y * side, height);
+            let place = Place { part: cell.part, x: v00.place.x + x * side, y: v00.place.y + y * side };
+            let position = self.sheet.point(place, height);
             self.workspace.pool.push(Node { position, force, area, stiffness });
         }
         true
     }
 
-    /// A bound of `σ` from above over a quarter of a cell: what the fields can at most be within the slanted box that
-    /// the surface lies in.
-    fn most(&self, corners: &[Vertex; 4], side: f64) -> f64 {
-        let frame = &self.solver.frame;
-        let [v00, v10, v01, v11] = corners;
-        let mean = |value: &dyn Fn(&Vertex) -> f64| 0.25 * corners.iter().map(value).sum::<f64>();
-        let (height, half) = (mean(&|vertex| vertex.height), 0.5 * side);
-        let rise =
-            [v10.height + v11.height - v00.height - v01.height, v01.height + v11.height - v00.height - v10.height]
-                .map(|rise| 0.25 * rise);
-        let twist = 0.25 * (v00.height + v11.height - v10.height - v01.height).abs();
-        let turn = |axis: usize| {
-            let slopes = corners.map(|vertex| vertex.slopes[axis]);
-            slopes.iter().fold(f64::MIN, |x, y| x.max(*y)) - slopes.iter().fold(f64::MAX, |x, y| x.min(*y))
-        };
-        let bend = twist + 0.25 * side * (turn(0) + turn(1));
-        let center = frame.point(v00.x + half, v00.y + half, height);
-        let legs = [
-            frame.u * (half * frame.scale[0]) + frame.normal * rise[0],
-            frame.v * (half * frame.scale[1]) + frame.normal * rise[1],
-            frame.normal * bend,
-        ];
-        self.solver.pair.most(&center, &legs)
-    }
-
     /// The surface over a place of the lattice, from a guess of its height, or a second one.
-    fn vertex(&mut self, place: (i32, i32), guess: f64, second: f64) -> Option<u32> {
-        if let Some(known) = self.workspace.places.get(&place) {
+    fn vertex(&mut self, key: (u8, i32, i32), guess: f64, second: f64) -> Option<u32> {
+        if let Some(known) = self.workspace.places.get(&key) {
             return *known;
         }
-        let (x, y) = (length(place.0), length(place.1));
-        let mut column = None;
-        for guess in [guess, second, 0.0] {
-            column = self.solver.column(x, y, guess);
-            if column.is_some() {
-                break;
-            }
-        }
-        let found = column.map(|column| {
-            let frame = &self.solver.frame;
-            let sample = &column.sample;
-            let fall = -sample.difference_gradient.dot(&frame.normal);
-            let rise = sample.sum_gradient.dot(&frame.normal);
-            let (mut slopes, mut gradient) = ([0.0; 2], [0.0; 2]);
-            for (axis, direction) in [frame.u, frame.v].into_iter().enumerate() {
-                slopes[axis] = sample.difference_gradient.dot(&direction) / fall * frame.scale[axis];
-                gradient[axis] = sample.sum_gradient.dot(&direction) * frame.scale[axis] + rise * slopes[axis];
-            }
-            // Vector area: n dA = ∇Φ / (∇Φ·normal) times the area in the plane.
-            let area = sample.difference_gradient * (-frame.unit_area() / fall);
-            let size = area.norm();
-            self.workspace.vertices.push(Vertex {
-                x,
-                y,
-                height: column.height,
-                slopes,
-                sum: column.sum,
-                gradient,
-                area,
-                stiffness: size * self.solver.pair.normal_stiffness(sample, &(area / size)),
-                weight: 0.0,
-            });
+        let place = Place { part: key.0, x: length(key.1), y: length(key.2) };
+        let found = self.sheet.look(place, guess, second).map(|vertex| {
+            self.workspace.vertices.push(vertex);
             (self.workspace.vertices.len() - 1) as u32
         });
-        if found.is_none() && self.leans.is_none() {
-            self.leans = self.contact_leaning(x, y, guess);
-        }
-        self.workspace.places.insert(place, found);
+        self.workspace.places.insert(key, found);
         found
     }
+}
 
-    /// Length of the part of a vector across the frame's normal.
-    fn sideways(&self, v: &Vec3) -> f64 {
-        (v - self.solver.frame.normal * v.dot(&self.solver.frame.normal)).norm()
-    }
-
-    /// The normal where a column was not found, if there is still pressure.
-    fn contact_leaning(&mut self, x: f64, y: f64, guess: f64) -> Option<Vec3> {
-        let sample = self.solver.pair.sample(&self.solver.frame.point(x, y, guess));
-        if sample.is_pressed(0.0) { sample.normal() } else { None }
-    }
+/// Length of the part of a vector across a unit vector.
+fn across(v: &Vec3, direction: &Vec3) -> f64 {
+    (v - direction * v.dot(direction)).norm()
 }
 
 /// `σ` in a part of a quarter of a cell, from the quarter's corners.
@@ -563,13 +419,21 @@ impl Reading {
         if inside {
             return Self { covered, pressed, doubt: 0.5 * (blended - joined).abs() };
         }
-        let least = positive(joined, slope_joined).1;
+        let least = positive(joined, slope_joined);
         if below == f64::INFINITY {
-            return Self { covered, pressed, doubt: least };
+            return Self { covered, pressed, doubt: least.1 };
         }
+        // Tangents from outside, where profiles have another slope, may lead away from what both of these agree on.
         let most = positive(below, slope_below);
-        let doubt = (most.1 - least).abs();
-        let (covered, pressed) = if pressed > most.1 { most } else { (covered, pressed) };
+        let (low, high) = if least.1 < most.1 { (least, most) } else { (most, least) };
+        let (covered, pressed) = if pressed < low.1 {
+            low
+        } else if pressed > high.1 {
+            high
+        } else {
+            (covered, pressed)
+        };
+        let doubt = high.1 - low.1;
         Self { covered, pressed, doubt }
     }
 }
