@@ -68,6 +68,12 @@ impl Frame {
     }
 }
 
+/// `|Φ|` below which the last Newton step is extrapolated instead of evaluated, for a contact of this highest `σ`: what
+/// is left of `Φ` tilts the vector area in proportion.
+pub fn accept(peak: f64, tolerance: f64) -> f64 {
+    peak * tolerance.min(0.015)
+}
+
 /// What a column needs besides its place.
 pub struct Solver<'a> {
     /// The two coats.
@@ -128,14 +134,13 @@ fn moments(polygon: &[(f64, f64)]) -> Option<((f64, f64), (f64, f64), [f64; 2])>
 }
 
 /// Steepest surface that still counts as a height over the plane, as the cosine of its tilt.
-const STEEPEST: f64 = 0.12;
+pub const STEEPEST: f64 = 0.12;
 
 impl Solver<'_> {
     /// Sets how far the roots are solved for a contact of this highest `σ`. What a last Newton step leaves of the border
-    /// is its square, and the rules count on the pressure being zero there; what is left of `Φ` tilts the vector area
-    /// in proportion.
+    /// is its square, and the rules count on the pressure being zero there.
     pub fn aim(&mut self, peak: f64, tolerance: f64) {
-        self.accept = peak * tolerance.min(0.015);
+        self.accept = accept(peak, tolerance);
         self.border_step = 0.3 * tolerance.sqrt();
     }
 
@@ -182,7 +187,8 @@ impl Solver<'_> {
     }
 
     /// Scales the frame so that the border is near the unit circle: first as the pressure's curvature predicts, then, if
-    /// that is off, by the border itself; `None` where there is no border. A tilted face is deepest at its rounded edge, which tells nothing of its size.
+    /// that is off, by the border itself; `None` where there is no border. A tilted face is deepest at its rounded edge,
+    /// which tells nothing of its size.
     pub fn fit(&mut self, at: &Deepest, extent: f64) -> Option<Fit> {
         let predicted = at.curvature.map(|c| if c < 0.0 { (2.0 * at.sum / -c).sqrt().min(extent) } else { extent });
         self.frame.scale = predicted;

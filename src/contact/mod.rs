@@ -21,6 +21,7 @@ pub mod standing;
 pub mod stiffness;
 pub mod surface;
 pub mod tally;
+mod target;
 
 /// How the contact surface is integrated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -8,12 +8,9 @@
 //! Flat faces have corners, and a pressure that drops near the border: no fixed rule sees them. A patch that was not
 //! found to be smooth, or whose rules do not agree, is integrated by halving: along each azimuth, and over the azimuths.
 
-use super::Scheme;
 use super::column::{Fit, Frame, Solver};
-use super::deepest::Deepest;
-use super::pair::Pair;
 use super::patch::Node;
-use super::surface::Settings;
+use super::target::{Integrated, Target, Unfit};
 use crate::math::Vec3;
 
 /// A rule for `∫₀¹ f(s) s ds` with `f(1) = 0`, exact to degree `2 n`; and a coarser one on the same points and the
@@ -136,22 +133,6 @@ const LEVELS: [(usize, usize); 9] = [(6, 0), (8, 0), (12, 1), (16, 2), (24, 3), 
 /// Part of the tolerance that the roots may use up.
 pub(super) const SOLVING: f64 = 0.2;
 
-/// A patch that was integrated.
-pub struct Integrated {
-    /// Estimated relative error of its force.
-    pub error: f64,
-    /// Evaluations it took.
-    pub evaluations: u32,
-    /// Its frame.
-    pub frame: Frame,
-}
-
-/// Why the polar patch is not the right scheme here.
-pub struct NotStarShaped {
-    /// Evaluations it took to find out.
-    pub evaluations: u32,
-}
-
 /// Most azimuths, and most places along one, of a patch that is integrated by halving.
 const MOST_AZIMUTHS: usize = 400;
 const MOST_RADII: usize = 80;
@@ -178,20 +159,17 @@ struct Line {
 
 /// Integrates the patch round a deepest point to the relative tolerance asked for, appending to `nodes`, and to `border` the
 /// radius of the border at equally spaced azimuths, in the frame's units. What does not meet the tolerance stands, with
-/// its estimate, when no other scheme is to be used.
+/// its estimate, when no other scheme is to be used: when polar is `alone`.
 pub fn integrate(
-    pair: &Pair,
-    at: &Deepest,
-    extent: f64,
-    settings: &Settings,
+    target: &Target,
+    alone: bool,
     workspace: &mut Workspace,
     nodes: &mut Vec<Node>,
     border: &mut Vec<f64>,
-) -> Result<Integrated, NotStarShaped> {
-    let tolerance = settings.tolerance;
+) -> Result<Integrated, Unfit> {
+    let Target { at, extent, tolerance, .. } = *target;
     let (first, first_border) = (nodes.len(), border.len());
-    let mut solver = Solver { pair, frame: Frame::new(at, [1.0, 1.0]), accept: 0.0, border_step: 0.0, evaluations: 0 };
-    solver.aim(at.sum, tolerance);
+    let mut solver = target.solver(Frame::new(at, [1.0, 1.0]));
     let fit = solver.fit(at, extent);
     if fit == Some(Fit::Predicted) {
         let start = match tolerance {
@@ -222,10 +200,10 @@ pub fn integrate(
         border.truncate(first_border);
     }
     let done = if fit.is_some() { halve(&mut solver, at.sum, tolerance, workspace, border, nodes) } else { None };
-    let Some(error) = done.filter(|error| settings.scheme == Scheme::Polar || *error <= tolerance) else {
+    let Some(error) = done.filter(|error| alone || *error <= tolerance) else {
         nodes.truncate(first);
         border.truncate(first_border);
-        return Err(NotStarShaped { evaluations: solver.evaluations });
+        return Err(Unfit { evaluations: solver.evaluations });
     };
     Ok(Integrated { error, evaluations: solver.evaluations, frame: solver.frame })
 }

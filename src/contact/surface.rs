@@ -8,6 +8,7 @@ use super::deepest::{self, Approach, Deepest};
 use super::overload::is_overloaded;
 use super::pair::{Pair, Side};
 use super::patch::{self, Node, Patch};
+use super::target::{Target, Unfit};
 use super::{adaptive, facets, polar, seeds};
 use crate::coat::seeds::Ray;
 use crate::field::Shape;
@@ -282,23 +283,24 @@ impl Surface {
 fn patch(pair: &Pair, settings: &Settings, at: &Deepest, extent: f64, out: &mut Surface) -> bool {
     let first = out.nodes.len();
     let (first_border, first_cell) = (out.borders.len(), out.cells.len());
+    let target = Target { pair, at, extent, tolerance: settings.tolerance };
     let mut spent = 0;
     // Where skeletons blend, the surface has more than one face, and what lies between them may be missed.
     let facets = pair.is_simple() && !matches!(settings.scheme, Scheme::Polar | Scheme::Adaptive);
     if facets {
         let first_corner = out.outlines.len();
-        match facets::integrate(pair, at, settings.tolerance, &mut out.pieces, &mut out.nodes, &mut out.outlines) {
+        match facets::integrate(&target, &mut out.pieces, &mut out.nodes, &mut out.outlines) {
             Ok(done) => {
                 out.push(at, first, pair.scale, done.error, done.evaluations, Scheme::Facets);
                 out.cover(Covered::Outline(done.frame, (first_corner, out.outlines.len())));
                 return true;
             }
-            Err(facets::NoFacets { evaluations }) => spent = evaluations,
+            Err(Unfit { evaluations }) => spent = evaluations,
         }
     }
     if settings.scheme != Scheme::Adaptive {
         let Surface { polar, nodes, borders, .. } = out;
-        match polar::integrate(pair, at, extent, settings, polar, nodes, borders) {
+        match polar::integrate(&target, settings.scheme == Scheme::Polar, polar, nodes, borders) {
             Ok(done) => {
                 let region = Covered::Polar(done.frame, (first_border, out.borders.len()));
                 // A border that was searched too far out may be another patch's.
@@ -310,17 +312,16 @@ fn patch(pair: &Pair, settings: &Settings, at: &Deepest, extent: f64, out: &mut 
                 out.nodes.truncate(first);
                 spent += done.evaluations;
             }
-            Err(polar::NotStarShaped { evaluations }) => spent += evaluations,
+            Err(Unfit { evaluations }) => spent += evaluations,
         }
     }
-    match adaptive::integrate(pair, at, extent, settings.tolerance, &mut out.workspace, &mut out.nodes, &mut out.cells)
-    {
+    match adaptive::integrate(&target, &mut out.workspace, &mut out.nodes, &mut out.cells) {
         Ok(done) => {
             out.push(at, first, pair.scale, done.error, done.evaluations + spent, Scheme::Adaptive);
             out.cover(Covered::Cells(done.frame, (first_cell, out.cells.len())));
             true
         }
-        Err(adaptive::LeansOver { evaluations }) => {
+        Err(Unfit { evaluations }) => {
             out.evaluations += evaluations + spent;
             false
         }

@@ -82,7 +82,7 @@ pub struct Cell {
     /// In contact all over.
     inside: bool,
     force: Vec3,
-    /// How far the force may be off, along the frame's normal and, in a cell that is inside, sideways.
+    /// How far the force may be off, along the sheet's normal and, in a cell that is inside, sideways.
     error: f64,
     aside: f64,
     /// The nodes of a cell on the border, in the pool.

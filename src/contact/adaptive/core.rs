@@ -2,18 +2,19 @@
 //!
 //! Of two coats, the surface lies over the core of the steeper one wherever the other is: along a ray outwards from the
 //! core the steeper pressure falls faster than the other can, so that `Φ` has one zero at most. The rays from the faces,
-//! the edges, by quarters of a turn, and the corners, by octants, go through all of space round a core. Where a ray
-//! leaves its own coat the other's field tells whether there is contact, since the border lies where both pressures are
-//! nil.
+//! the edges, by quarters of a turn, and the corners, by octants, go through all of space round a core. Where a face
+//! is pressed into the core of its box, its rays go on inwards, to where those of its neighbours end. Where a ray leaves
+//! its own coat the other's field tells whether there is contact, since the border lies where both pressures are nil.
 
 use std::f64::consts::PI;
 
+use super::SOLVED;
 use super::cells::{Cells, FIRST_HALF, GRID, Place, Sheet, Vertex, Workspace};
-use super::{Integrated, LeansOver};
-use crate::contact::column::Frame;
+use crate::contact::column::{Frame, STEEPEST, accept};
 use crate::contact::deepest::Deepest;
 use crate::contact::pair::{Pair, Sample};
 use crate::contact::patch::Node;
+use crate::contact::target::{Integrated, Target, Unfit};
 use crate::field::Shape;
 use crate::math::{Vec3, tangents};
 
@@ -34,9 +35,6 @@ struct Part {
 const MOST_PARTS: usize = 26;
 /// Most evaluations over a place.
 const MOST_LOOKS: usize = 40;
-/// Smallest part of its gradient that `Φ` falls by along a ray, where there is contact.
-const STEEPEST: f64 = 0.12;
-
 /// Sine of the angle between a segment and the normal below which the segment has no side that faces the other.
 const LEVEL: f64 = 1e-6;
 /// Predicted half width of a contact, over the thickness of the coat, beyond which it goes round what is round.
@@ -105,16 +103,10 @@ struct Core<'a> {
 }
 
 /// The same as [`super::integrate`], if the steeper coat has a core that is known here.
-pub fn integrate(
-    pair: &Pair,
-    at: &Deepest,
-    extent: f64,
-    tolerance: f64,
-    workspace: &mut Workspace,
-    nodes: &mut Vec<Node>,
-) -> Result<Integrated, LeansOver> {
-    let Some(sheet) = Core::new(pair, at, at.sum * tolerance.min(0.015) * 1e-2) else {
-        return Err(LeansOver { evaluations: 0 });
+pub fn integrate(target: &Target, workspace: &mut Workspace, nodes: &mut Vec<Node>) -> Result<Integrated, Unfit> {
+    let Target { at, extent, tolerance, .. } = *target;
+    let Some(sheet) = Core::new(target) else {
+        return Err(Unfit { evaluations: 0 });
     };
     workspace.clear();
     let mut work = Cells { sheet, workspace };
@@ -134,7 +126,7 @@ pub fn integrate(
     let Cells { sheet, workspace } = work;
     let evaluations = sheet.evaluations;
     if sheet.is_lost() || workspace.cells.is_empty() {
-        return Err(LeansOver { evaluations });
+        return Err(Unfit { evaluations });
     }
     workspace.collect(&sheet, nodes);
     Ok(Integrated { error, evaluations, frame: Frame::new(at, [extent; 2]) })
@@ -161,7 +153,8 @@ fn core_of(shape: &Shape, at: &Deepest) -> Option<(Vec3, [f64; 3], [Vec3; 3])> {
 }
 
 impl<'a> Core<'a> {
-    fn new(pair: &'a Pair, at: &Deepest, accept: f64) -> Option<Self> {
+    fn new(target: &Target<'a>) -> Option<Self> {
+        let Target { pair, at, tolerance, .. } = *target;
         if !pair.is_simple() {
             return None;
         }
@@ -202,6 +195,7 @@ impl<'a> Core<'a> {
         }
         let share = pair.shares()[own];
         let depth = half.into_iter().fold(f64::INFINITY, f64::min);
+        let accept = SOLVED * accept(at.sum, tolerance);
         Some(Self { pair, parts, count, depth, thickness, of_a, share, accept, evaluations: 0, lost: false })
     }
 

@@ -9,10 +9,8 @@ mod cells;
 mod core;
 mod plane;
 
-use super::column::Frame;
-use super::deepest::Deepest;
-use super::pair::Pair;
 use super::patch::Node;
+use super::target::{Integrated, Target, Unfit};
 
 pub use plane::grid_cell;
 
@@ -23,39 +21,23 @@ pub struct Workspace {
     spread: plane::Spread,
 }
 
-/// An integrated patch.
-pub struct Integrated {
-    /// Estimated relative error of its force.
-    pub error: f64,
-    /// Evaluations it took.
-    pub evaluations: u32,
-    /// Its frame.
-    pub frame: Frame,
-}
+/// Part of `|Φ|` elsewhere to which heights are solved here, so that a symmetric contact comes out symmetric: no guess
+/// from a neighbour shows.
+const SOLVED: f64 = 1e-2;
 
-/// The surface leans over somewhere: it is no height over a sheet.
-pub struct LeansOver {
-    /// Evaluations it took to find out.
-    pub evaluations: u32,
-}
-
-/// Integrates the connected patch that holds a deepest point, appending to `nodes`, and to `cells` those
-/// of the first grid that hold contact, in order.
+/// Integrates the connected patch that holds a deepest point, appending to `nodes`, and to `cells` those of the first
+/// grid that hold contact, in order. Unfit when the surface is no height over a sheet.
 pub fn integrate(
-    pair: &Pair,
-    at: &Deepest,
-    extent: f64,
-    tolerance: f64,
+    target: &Target,
     workspace: &mut Workspace,
     nodes: &mut Vec<Node>,
     cells: &mut Vec<(i32, i32)>,
-) -> Result<Integrated, LeansOver> {
-    let wrapped = core::integrate(pair, at, extent, tolerance, &mut workspace.cells, nodes);
-    let LeansOver { evaluations: spent } = match wrapped {
+) -> Result<Integrated, Unfit> {
+    let spent = match core::integrate(target, &mut workspace.cells, nodes) {
         Ok(done) => return Ok(done),
-        Err(lost) => lost,
+        Err(Unfit { evaluations }) => evaluations,
     };
-    let flat = plane::integrate(pair, at, extent, tolerance, workspace, nodes, cells);
+    let flat = plane::integrate(target, workspace, nodes, cells);
     flat.map(|done| Integrated { evaluations: done.evaluations + spent, ..done })
-        .map_err(|LeansOver { evaluations }| LeansOver { evaluations: evaluations + spent })
+        .map_err(|Unfit { evaluations }| Unfit { evaluations: evaluations + spent })
 }

@@ -4,11 +4,12 @@ use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 
 use super::cells::{Cells, FIRST_HALF, GRID, MOST_FIRST_CELLS, Place, Sheet, Vertex};
-use super::{Integrated, LeansOver, Workspace};
+use super::{SOLVED, Workspace};
 use crate::contact::column::{Frame, Solver};
 use crate::contact::deepest::Deepest;
 use crate::contact::pair::Pair;
 use crate::contact::patch::Node;
+use crate::contact::target::{Integrated, Target, Unfit};
 use crate::math::Vec3;
 
 /// Sum of two unit normals below which they are opposite: no plane is between.
@@ -38,19 +39,15 @@ struct Plane<'a> {
 
 /// The same as [`super::integrate`], over planes.
 pub fn integrate(
-    pair: &Pair,
-    at: &Deepest,
-    extent: f64,
-    tolerance: f64,
+    target: &Target,
     workspace: &mut Workspace,
     nodes: &mut Vec<Node>,
     cells: &mut Vec<(i32, i32)>,
-) -> Result<Integrated, LeansOver> {
+) -> Result<Integrated, Unfit> {
+    let Target { at, extent, tolerance, .. } = *target;
     let Workspace { cells: workspace, spread } = workspace;
-    let mut solver = Solver { pair, frame: Frame::new(at, [1.0, 1.0]), accept: 0.0, border_step: 0.0, evaluations: 0 };
-    solver.aim(at.sum, tolerance);
-    // Solved out, so that a symmetric contact comes out symmetric: no guess from a neighbour shows.
-    solver.accept *= 1e-2;
+    let mut solver = target.solver(Frame::new(at, [1.0, 1.0]));
+    solver.accept *= SOLVED;
     if solver.fit(at, extent).is_none() {
         // No clear border along an axis: the prediction will do, the cells spread by themselves.
         let scale = solver.frame.scale.map(|s| s.min(extent));
@@ -72,7 +69,7 @@ pub fn integrate(
         let solver = &mut sheet.solver;
         let between = solver.frame.normal + normal;
         if turns == MOST_TURNS || between.norm() < OPPOSITE {
-            return Err(LeansOver { evaluations: solver.evaluations });
+            return Err(Unfit { evaluations: solver.evaluations });
         }
         turns += 1;
         solver.frame = solver.frame.facing(&between);
@@ -80,7 +77,7 @@ pub fn integrate(
     let (frame, evaluations) = (sheet.solver.frame, sheet.solver.evaluations);
     if workspace.cells.is_empty() {
         // Nothing of it is seen along the plane's normal.
-        return Err(LeansOver { evaluations });
+        return Err(Unfit { evaluations });
     }
     workspace.collect(&sheet, nodes);
     let first = cells.len();

@@ -13,11 +13,11 @@ mod rules;
 use polygon::{CORNERS, Corner, Owner, Place, Polygon, between, cross, dot, layout};
 use rules::{ALONG, LEVELS, OUTWARDS};
 
-use super::column::{Column, Frame, Solver};
+use super::column::{Column, Solver};
 use super::deepest::Deepest;
-use super::pair::Pair;
 use super::patch::Node;
 use super::polar::{RULES, SOLVING};
+use super::target::{Integrated, Target, Unfit};
 use crate::field::Shape;
 use crate::math::Vec3;
 
@@ -66,39 +66,21 @@ pub struct Workspace {
     pool: Vec<Node>,
 }
 
-/// An integrated patch.
-pub struct Integrated {
-    /// Estimated relative error of its force.
-    pub error: f64,
-    /// Evaluations it took.
-    pub evaluations: u32,
-    /// Its frame.
-    pub frame: Frame,
-}
-
-/// The contact is not made of facets.
-pub struct NoFacets {
-    /// Evaluations it took to find out.
-    pub evaluations: u32,
-}
-
-/// Integrates the patch round a deepest point to a relative `tolerance`, appending to `nodes`, and to `outline` the
+/// Integrates the patch round a deepest point to the relative tolerance asked for, appending to `nodes`, and to `outline` the
 /// places round its border, counter-clockwise.
 pub fn integrate(
-    pair: &Pair,
-    at: &Deepest,
-    tolerance: f64,
+    target: &Target,
     workspace: &mut Workspace,
     nodes: &mut Vec<Node>,
     outline: &mut Vec<Place>,
-) -> Result<Integrated, NoFacets> {
+) -> Result<Integrated, Unfit> {
+    let Target { pair, at, tolerance, .. } = *target;
     let first = outline.len();
     let mut evaluations = 0;
     // A face that leans so far that only its edge is in contact gives way to that edge.
     for faces in [true, false] {
         let Some((frame, polygon)) = layout(pair, at, faces) else { continue };
-        let mut solver = Solver { pair, frame, accept: 0.0, border_step: 0.0, evaluations };
-        solver.aim(at.sum, tolerance);
+        let solver = Solver { evaluations, ..target.solver(frame) };
         let [i, j] = at.skeletons;
         let endless = |shape: &Shape| matches!(shape, Shape::Plane { .. });
         let against_plane = endless(&pair.a.skeletons[i].shape) || endless(&pair.b.skeletons[j].shape);
@@ -116,7 +98,7 @@ pub fn integrate(
         }
         outline.truncate(first);
     }
-    Err(NoFacets { evaluations })
+    Err(Unfit { evaluations })
 }
 
 impl Workspace {
