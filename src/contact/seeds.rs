@@ -263,7 +263,12 @@ fn share_out(pair: &Pair, first: usize, tally: &Tally, out: &mut Surface) {
     for patch in owned.chunk_by(|x, y| x.0 == y.0) {
         let begin = out.nodes.len();
         out.nodes.extend(patch.iter().map(|(_, node)| *node));
-        let error = (law * (patch.len() as f64).powf(-1.2) + tally.doubt()).min(1.0);
+        // What is pressed from all sides is the small rest of large loads, each of which errs by its part.
+        let (load, force) = patch
+            .iter()
+            .fold((0.0, Vec3::zeros()), |(load, force), (_, node)| (load + node.force.norm(), force + node.force));
+        let error = (law * (patch.len() as f64).powf(-1.2) + tally.doubt()) * (load / force.norm());
+        let error = if error < 1.0 { error } else { 1.0 };
         let at = out.maxima[patch[0].0];
         out.push(&at, begin, pair.scale, error, rest, Scheme::Seeds);
         rest = 0;

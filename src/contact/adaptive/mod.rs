@@ -9,6 +9,7 @@ mod cells;
 mod core;
 mod plane;
 
+use self::core::Core;
 use super::patch::Node;
 use super::target::{Integrated, Target, Unfit};
 
@@ -25,19 +26,41 @@ pub struct Workspace {
 /// from a neighbour shows.
 const SOLVED: f64 = 1e-2;
 
+/// Estimated error beyond which the other sheet is asked as well.
+const POOR: f64 = 0.1;
+
 /// Integrates the connected patch that holds a deepest point, appending to `nodes`, and to `cells` those of the first
-/// grid that hold contact, in order. Unfit when the surface is no height over a sheet.
+/// grid of a plane that hold contact, in order. Unfit when the surface is no height over a sheet.
 pub fn integrate(
     target: &Target,
     workspace: &mut Workspace,
     nodes: &mut Vec<Node>,
     cells: &mut Vec<(i32, i32)>,
 ) -> Result<Integrated, Unfit> {
-    let spent = match core::integrate(target, &mut workspace.cells, nodes) {
-        Ok(done) => return Ok(done),
-        Err(Unfit { evaluations }) => evaluations,
-    };
-    let flat = plane::integrate(target, workspace, nodes, cells);
-    flat.map(|done| Integrated { evaluations: done.evaluations + spent, ..done })
-        .map_err(|Unfit { evaluations }| Unfit { evaluations: evaluations + spent })
+    let Some(core) = Core::new(target) else { return plane::integrate(target, workspace, nodes, cells) };
+    let (first, first_cell) = (nodes.len(), cells.len());
+    let core_first = core.wraps();
+    let mut core = Some(core);
+    let (mut best, mut evaluations) = (None::<Integrated>, 0);
+    for over_core in [core_first, !core_first] {
+        let (end, end_cell) = (nodes.len(), cells.len());
+        let done = match core.take_if(|_| over_core) {
+            Some(core) => core::integrate(core, target, &mut workspace.cells, nodes),
+            None => plane::integrate(target, workspace, nodes, cells),
+        };
+        let (Ok(Integrated { evaluations: spent, .. }) | Err(Unfit { evaluations: spent })) = done;
+        evaluations += spent;
+        if let Some(done) = done.ok().filter(|done| best.is_none_or(|best| done.error < best.error)) {
+            nodes.drain(first..end);
+            cells.drain(first_cell..end_cell);
+            best = Some(done);
+        } else {
+            nodes.truncate(end);
+            cells.truncate(end_cell);
+        }
+        if best.is_some_and(|best| best.error <= POOR) {
+            break;
+        }
+    }
+    best.map(|best| Integrated { evaluations, ..best }).ok_or(Unfit { evaluations })
 }
